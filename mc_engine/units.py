@@ -7,6 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from mc_engine.errors import ModelError
 from mc_engine.suggestions import nearest
 
 Number = TypeVar("Number", float, np.ndarray)
@@ -93,6 +94,7 @@ _BY_QUANTITY: dict[str, dict[str, float]] = {
     "rate of magnetic flux density": {"T/s": 1.0, "nT/s": 1e-9},
     "magnetic dipole": {"A m^2": 1.0, "mA m^2": 1e-3},
 }  # fmt: skip
+_LONGEST_ENDING = 5  # words of a unit at the end of a name, as in _n_m_s or _deg_sqrt_h
 _ALSO_WRITTEN = str.maketrans(
     {"²": "2", "³": "3", "µ": "u", "μ": "u", "°": "deg", "Ω": "ohm"} | dict.fromkeys(" ^*·()_")
 )
@@ -152,3 +154,45 @@ def convert(value: Number, unit: str, to: str) -> Number:
 def compatible(unit: str) -> list[str]:
     """All units of the quantity that `unit` measures."""
     return [name for name, other in UNITS.items() if other.quantity == UNITS[unit].quantity]
+
+
+def unit_of(name: str) -> str:
+    """The unit at the end of a column's name; ModelError where there is none, or where it may be two.
+
+    >>> unit_of("burn_dv_m_s"), unit_of("heat_load_mj_m2")
+    ('m/s', 'MJ/m^2')
+    """
+    units = units_meant(name)
+    if len(units) == 1:
+        return units[0]
+    if units:
+        raise ModelError(f'"{name}" may end in the unit {" or ".join(units)}; say which, unit="{units[0]}"')
+    alike = _alike(name)
+    ending = f'; did you mean "{alike}"?' if alike else ""
+    raise ModelError(f'"{name}" ends in no unit{ending}; say unit="" for a plain number; `mc-engine units` lists all')
+
+
+def units_meant(name: str) -> list[str]:
+    """The units that the end of a column's name can be read as: one, several, or none."""
+    known = units_at_the_end(name)
+    longest = max((unit_suffix(unit) for unit in known), key=len, default="")
+    units = [unit for unit in known if unit_suffix(unit) == longest]
+    if longest.startswith("_1_"):  # stage_1_s is a time of stage 1, or a rate
+        units += [unit for unit in known if unit_suffix(unit) == longest[2:]]
+    return units
+
+
+def units_at_the_end(name: str) -> list[str]:
+    """Every unit that a column's name may end in."""
+    return [unit for unit in UNITS if unit and name.endswith(unit_suffix(unit)) and name != unit_suffix(unit)]
+
+
+def _alike(name: str) -> str:
+    """The name with the unit that its last words are nearly; "" where they are like none."""
+    words = name.split("_")
+    for count in range(1, min(_LONGEST_ENDING, len(words) - 1) + 1):
+        ending = "_".join(words[-count:]) or "_"
+        alike = [unit for unit in UNITS if unit == "%" or unit[:1].lower() == ending[0].lower()]
+        if near := nearest_unit(ending, alike):
+            return "_".join(words[:-count]) + unit_suffix(near)
+    return ""

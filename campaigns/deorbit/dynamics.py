@@ -9,9 +9,10 @@ difference of large numbers, and within a Runge-Kutta step two places taken apar
 
 from collections import namedtuple
 
+from campaigns.deorbit.inputs import CHOICES
 from mc_engine.lanes import any_lane, atan2, exp, physics, replace, sincos, sqrt, where
 from mc_engine.lanes.noise import normal_pair
-from mc_engine.model import Setting, states
+from mc_engine.model import states
 from mc_engine.physics.atmosphere import layered
 from mc_engine.physics.constants import EARTH_RATE, EQUATORIAL_RADIUS, MU_EARTH
 from mc_engine.physics.frames import half_turn
@@ -31,13 +32,6 @@ State = states(
 Memory = namedtuple("Memory", "position_error velocity_error scale on pulses", defaults=(0.0, 0.0))
 Elements = namedtuple("Elements", "a e omega")
 Desired = namedtuple("Desired", "position velocity acceleration radial transverse rate")
-
-CONTROL = Setting("continuous", "how the commanded force is flown", choices=("continuous", "clipped", "pulsed", "off"))
-PULSE_FEED = Setting("continuous", "what feeds the modulator", choices=("continuous", "closed_loop"))
-MASS_MODEL = Setting("constant", "mass that turns force into acceleration", choices=("constant", "burning"))
-# settings arrive as numbers
-CLIPPED, PULSED, OFF = CONTROL.code("clipped"), CONTROL.code("pulsed"), CONTROL.code("off")
-FEED_CONTINUOUS, BURNING = PULSE_FEED.code("continuous"), MASS_MODEL.code("burning")
 
 
 @physics
@@ -173,7 +167,7 @@ def ideal_errors(t, p):
 def craft_mass(s, p, o):
     """Mass [kg]: constant as in the source, or falling with the impulse.  (40)"""
     mass = p.initial_mass
-    if o.mass_model == BURNING:
+    if o.mass_model == CHOICES.mass_model.burning:
         mass = mass * exp(-s.impulse / p.exhaust)
     return mass
 
@@ -182,7 +176,7 @@ def craft_mass(s, p, o):
 def command(t, s, m, d, p, o):
     """Commanded force [N] as a vector, and its size; zero when the control is off."""
     e, w = deviation(s)
-    if o.control == PULSED and o.pulse_feed == FEED_CONTINUOUS:
+    if o.control == CHOICES.control.pulsed and o.pulse_feed == CHOICES.pulse_feed.continuous:
         e, w = ideal_errors(t, p)
         u = law(d, e, w, p, o)
     elif any_lane(p.misled > 0.0):
@@ -190,7 +184,7 @@ def command(t, s, m, d, p, o):
     else:  # the same numbers as with errors of zero, for half the work
         u = law(d, e, w, p, o)
     mass = craft_mass(s, p, o)
-    if o.control == OFF:
+    if o.control == CHOICES.control.off:
         mass = 0.0
     return scaled(mass, u), mass * norm(u)
 
@@ -198,9 +192,9 @@ def command(t, s, m, d, p, o):
 @physics
 def thrust(size, m, p, o):
     """(scale, force): what the thrusters make of a command of this size [N]; force [N] is the true one."""
-    if o.control == CLIPPED:
+    if o.control == CHOICES.control.clipped:
         scale = where(size > p.thrust_limit, p.thrust_limit / where(size > 0.0, size, 1.0), 1.0)
-    elif o.control == PULSED:
+    elif o.control == CHOICES.control.pulsed:
         scale = m.on * p.thrust_limit / where(size > 0.0, size, 1.0)
     else:
         scale = 1.0
@@ -233,7 +227,7 @@ def rhs(t, s, m, p, o):
     free = added(subtracted(gravity, d.acceleration), disturbances(r, v, p, o))
     a = added_scaled(free, scale * inverse_mass, commanded)
     filtered = 0.0
-    if o.control == PULSED:
+    if o.control == CHOICES.control.pulsed:
         k_in, k_fb = p.modulator_input_gain, p.modulator_feedback_gain
         filtered = lag_rate(s.filtered, size, m.on * p.thrust_limit, k_in, k_fb, p.modulator_time_constant)
     return State(

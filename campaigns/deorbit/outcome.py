@@ -1,6 +1,7 @@
 """Quantities along a de-orbit flight and metrics at its end.  SI, radians."""
 
-from campaigns.deorbit.dynamics import OFF, command, desired_motion, deviation, element_errors, flown, initial, thrust
+from campaigns.deorbit.dynamics import command, desired_motion, deviation, element_errors, flown, initial, thrust
+from campaigns.deorbit.inputs import CHOICES
 from mc_engine.lanes import asin, atan2, exp, maximum, minimum, physics, sqrt, where
 from mc_engine.model import Field, at_end, last_above, maximum_of, metrics, minimum_of, outputs
 from mc_engine.physics.constants import EARTH_RATE
@@ -120,7 +121,7 @@ def evaluate(t, s, m, p, o, best, when):
     entry_time = t + p.burn_delay
     spent = p.initial_mass * (1.0 - exp(-s.impulse / p.exhaust))  # (40)
     # not settled at entry is no settling time: such a case counts against a requirement on it
-    unsettled = (observe(t, s, m, p, o).unsettled > SETTLED) | (o.control == OFF)
+    unsettled = (observe(t, s, m, p, o).unsettled > SETTLED) | (o.control == CHOICES.control.off)
     _, first_velocity_error = deviation(p)
     first = element_errors(initial(p), p)
     return Metrics(

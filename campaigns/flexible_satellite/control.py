@@ -7,22 +7,12 @@ SI.  Numbers in brackets are equations of H. Taei, S. Ayati, S. F. Mousavi, Iran
 from collections import namedtuple
 
 from campaigns.flexible_satellite.dynamics import body_rate, initial
+from campaigns.flexible_satellite.inputs import CHOICES
 from mc_engine.lanes import any_lane, physics, sqrt, where
 from mc_engine.lanes.noise import normal_pair, uniform_pair
-from mc_engine.model import Setting
 from mc_engine.physics.attitude import second_axis_in_body, turned_slightly
 from mc_engine.physics.pulse_modulators import at_rest, sampled_pulses
 from mc_engine.physics.vectors import Matrix, Vector, added, added_scaled, dot, matrix_times, scaled, subtracted
-
-ACTUATOR = Setting("ideal", "what turns command into torque", choices=("ideal", "pwpf"))
-RATE_USED = Setting("inertial", "rate that the law works with", choices=("inertial", "orbital"))
-DISTURBANCE_DRAW = Setting(
-    "run",
-    "disturbance_offset holds all the run, or every sample draws afresh, uniform within 0.5 of it",
-    choices=("run", "sample"),
-)
-# settings arrive as numbers
-PWPF, ORBITAL, PER_SAMPLE = ACTUATOR.code("pwpf"), RATE_USED.code("orbital"), DISTURBANCE_DRAW.code("sample")
 
 # integral of (13), half a sample behind; torques [N m]: asked for, of the actuators along their axes, on the body; the
 # modulators of the axes; torques that late valves leave for the next sample and the one after
@@ -47,9 +37,8 @@ def start(p, o):
 def known(s, p, o):
     """Vector part of the attitude and the rate [rad/s] that the law works with, without errors."""
     w = body_rate(s, p)
-    if (
-        o.rate_used == ORBITAL
-    ):  # relative to the orbital frame, which turns at -orbit_rate about its second axis (6)-(9)
+    # relative to the orbital frame, which turns at -orbit_rate about its second axis (6)-(9)
+    if o.rate_used == CHOICES.rate_used.orbital:
         w = added_scaled(w, p.orbit_rate, Vector(*second_axis_in_body(s.q0, s.q1, s.q2, s.q3)))
     return Vector(s.q1, s.q2, s.q3), w
 
@@ -118,7 +107,7 @@ def control(s, m, p, o, draws):
     integral = added_scaled(m.integral, 0.5 * period, n)  # by trapezoids: m.integral is half a sample behind
     command = law(q, w, integral, p)
     torque, x, y, z, coming, after = command, m.x, m.y, m.z, m.next, m.then
-    if o.actuator == PWPF:
+    if o.actuator == CHOICES.actuator.pwpf:
         x, y, z, fx, fy, fz = sampled_pulses(x, y, z, command.x, command.y, command.z, p, period)
         torque = scaled(p.torque, Vector(fx, fy, fz))
         if any_lane(p.now < 1.0):  # late valves: the shares now, next and then add to one, derived here
@@ -126,7 +115,7 @@ def control(s, m, p, o, draws):
             torque, coming = added_scaled(m.next, p.now, fired), added_scaled(m.then, p.next, fired)
     torque = Vector(p.thrust_x_factor * torque.x, p.thrust_y_factor * torque.y, p.thrust_z_factor * torque.z)
     offset = p.disturbance_offset
-    if o.disturbance_draw == PER_SAMPLE:
+    if o.disturbance_draw == CHOICES.disturbance_draw.sample:
         drawn, _ = uniform_pair(draws, 3)
         offset = (p.disturbance_offset - 0.5) + drawn
     steady = p.disturbance_amplitude * offset

@@ -1,7 +1,7 @@
 """Quantities along a flight of the flexible satellite and metrics at its end.  SI, radians."""
 
-from campaigns.flexible_satellite.control import PWPF
 from campaigns.flexible_satellite.dynamics import AXES, MODES, body_rate
+from campaigns.flexible_satellite.inputs import CHOICES
 from mc_engine.lanes import atan2, maximum, minimum, physics, sqrt, where
 from mc_engine.model import Field, at_end, last_above, maximum_of, metrics, outputs
 from mc_engine.physics.vectors import Vector, norm
@@ -113,7 +113,7 @@ def counted(shortest):
 def fired(impulse, thrust, p, o):
     """Time [s] that one axis fired; not a number where its thrust is nothing."""
     time = 0.0
-    if o.actuator == PWPF:
+    if o.actuator == CHOICES.actuator.pwpf:
         time = impulse / where(thrust > 0.0, p.torque * thrust, float("nan"))
     return time
 

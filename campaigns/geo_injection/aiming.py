@@ -13,6 +13,7 @@ import numpy as np
 
 from campaigns.geo_injection.design.coast import kepler
 from campaigns.geo_injection.design.program import Program
+from campaigns.geo_injection.inputs import CHOICES
 from campaigns.geo_injection.program_table import Nominal, Polynomial, Steering, burn_row, nominal
 from mc_engine.lanes import atan2, exp, floor, log, maximum, physics, sincos, sqrt, where
 from mc_engine.physics.constants import MU_EARTH
@@ -26,7 +27,6 @@ Place = namedtuple("Place", "x y z vx vy vz")
 # normal: to the orbit;  e: eccentricity vector;  h: angular momentum [m^2/s]
 Orbit = namedtuple("Orbit", "node ahead normal e h")
 
-OPEN_LOOP = 0.0  # of the setting `guidance`
 PLANAR = 1e-3  # sine of a tilt to the final plane below which the orbit before the last burn has no node to speak of
 
 
@@ -141,7 +141,7 @@ def stored(burn, p, o):
 def next_aim(t, s, burn, p, o):
     """The aim [1, m/s, s] of the next burn, as a coast begins: as stored, or of the last burn, if guided, aimed now."""
     aim = stored(burn, p, o)
-    if o.guidance > OPEN_LOOP:
+    if o.guidance == CHOICES.guidance.re_aimed:
         aim = where(burn + 1.0 >= nominal(o.tables).burns, _aimed(t, known(s, p), burn, p, o), aim)
     return aim
 

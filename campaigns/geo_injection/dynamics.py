@@ -7,7 +7,8 @@ errors; the program runs from the actual ignition of each burn.
 
 from collections import namedtuple
 
-from campaigns.geo_injection.aiming import OPEN_LOOP, next_aim, of_burn, stored, turned
+from campaigns.geo_injection.aiming import next_aim, of_burn, stored, turned
+from campaigns.geo_injection.inputs import CHOICES
 from campaigns.geo_injection.program_table import burn_row, nominal, segment_row
 from mc_engine.lanes import any_lane, fma, log, maximum, minimum, physics, sqrt, where
 from mc_engine.model import Event, states
@@ -40,7 +41,6 @@ Memory = namedtuple(
 )
 
 COAST, BURN, TAIL = 0.0, 1.0, 2.0
-BY_TIME = 0.0  # of the setting `shutdown`
 NEVER = -1.0  # value of an event that is not looked for
 
 
@@ -101,7 +101,7 @@ def _past_command(t, s, m, p, o):
 
     The accelerometer counts the speed change since ignition: by the rocket equation.
     """
-    if o.shutdown > BY_TIME:
+    if o.shutdown == CHOICES.shutdown.sensed_velocity:
         scale = (1.0 + p.accelerometer_scale_error) * (p.thrust / p.flow)
         return scale * log(maximum(m.mass_ignited / s.mass, 1e-300)) - m.aim.sensed
     return t - m.until
@@ -158,7 +158,7 @@ EVENTS = {
 def _arc(segment, ignited, aim, o):
     """The arc of a segment of a burn that was ignited at a time [s]."""
     row, steering = segment_row(o.tables, segment)
-    if o.guidance > OPEN_LOOP:
+    if o.guidance == CHOICES.guidance.re_aimed:
         steering = turned(steering, aim, o)
     half = 0.5 * row.length * aim.stretch
     after = ignited + row.start * aim.stretch

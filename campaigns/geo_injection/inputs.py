@@ -3,11 +3,8 @@
 from collections.abc import Iterable
 from typing import Any
 
-from mc_engine.model import Parameter, Setting, inputs
+from mc_engine.model import Parameter, Setting, choices, inputs
 
-METHODS = ("optimal", "staged")
-SHUTDOWNS = ("time", "sensed_velocity")
-GUIDANCE = ("open_loop", "re_aimed")
 BURNS = ("1", "2", "3")
 AXES = {"r": "radial", "t": "transverse", "n": "normal"}
 _AIMED = "from which the last burn is aimed"
@@ -70,13 +67,17 @@ Inputs = inputs(
     thrust_n=Setting(20000.0, "nominal thrust", low=1.0, dispersed_by="thrust_factor"),
     mass_flow_kg_s=Setting(6.14, "nominal mass flow", low=1e-6, dispersed_by="isp_factor"),
     initial_mass_kg=Setting(22170.0, "nominal mass at the first ignition", low=1.0, dispersed_by="initial_mass_factor"),
-    method=Setting("optimal", "how the burn program is designed", choices=METHODS),
+    method=Setting("optimal", "how the burn program is designed", choices=("optimal", "staged")),
     **_transfer(1),
     **_transfer(2),
-    shutdown=Setting("time", "what ends a burn", choices=SHUTDOWNS),
+    shutdown=Setting("time", "what ends a burn", choices=("time", "sensed_velocity")),
     tail_off_s=Setting(0.0, "time in which the thrust falls linearly to zero after the command", low=0.0, high=60.0),
-    guidance=Setting("open_loop", "the stored program, or its last burn aimed again", choices=GUIDANCE),
+    guidance=Setting(
+        "open_loop", "the stored program, or its last burn aimed again", choices=("open_loop", "re_aimed")
+    ),
     propellant_limit_kg=Setting(16775.0, "propellant on board, for the margin; the total of table 2", low=0.0),
     tolerance=Setting(1e-10, "error of an integration step relative to the state", low=1e-14, high=1e-4, unit=""),
     time_limit_s=Setting(1e6, "a flight that lasts longer ends without a result", low=1.0),
 )
+
+CHOICES = choices(Inputs)

@@ -11,7 +11,7 @@ from campaigns.geo_injection.aiming import nominal_impulse
 from campaigns.geo_injection.design.coast import kepler
 from campaigns.geo_injection.design.program import Program, program_for
 from campaigns.geo_injection.design.sequence import Sequence, source_orbits
-from campaigns.geo_injection.inputs import AXES, METHODS, Inputs
+from campaigns.geo_injection.inputs import AXES, CHOICES, Inputs
 from campaigns.geo_injection.program_table import table_of
 from mc_engine.errors import ModelError
 from mc_engine.model import AdaptiveStep, Refusals, model
@@ -28,12 +28,13 @@ ALLOWED = dynamics.State(x=1e-3, y=1e-3, z=1e-3, vx=1e-6, vy=1e-6, vz=1e-6, mass
 
 def sequence_of(o: Any) -> Sequence:
     """The sequence that settings by symbol (SI) ask for."""
-    burns, method, e = round(float(o.burns)), METHODS[int(o.method)], float(o.parking_eccentricity)
+    staged = bool(o.method == CHOICES.method.staged)
+    burns, e = round(float(o.burns)), float(o.parking_eccentricity)
     final = float(o.final_inclination)
     initial = final if o.planar > 0.5 else float(o.initial_inclination)
-    of_source = source_orbits(burns, abs(initial - final)) if method == "staged" else ()
+    of_source = source_orbits(burns, abs(initial - final)) if staged else ()
     return Sequence(
-        method=method,
+        method="staged" if staged else "optimal",
         burns=burns,
         initial_inclination=initial,
         final_inclination=final,
@@ -70,7 +71,8 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
     codes = np.column_stack(list(vars(settings).values()))
     rows = {name: np.zeros(len(codes)) for name in dynamics.Parameters._fields}
     late = np.zeros(len(codes), dtype=bool)
-    for row in np.unique(codes, axis=0):
+    # usually all cases have one sequence, and sorting their rows takes longer than flying the cases
+    for row in codes[:1] if (codes == codes[:1]).all() else np.unique(codes, axis=0):
         same = (codes == row).all(axis=1)
         chosen = SimpleNamespace(**dict(zip(vars(settings), row, strict=True)))
         try:

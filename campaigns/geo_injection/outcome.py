@@ -63,7 +63,7 @@ def orbit_of(s):
 def observe(t, s, m, p):
     """Outputs along the flight, SI and radians, inertial axes."""
     orbit = orbit_of(s)
-    # on a coast a polynomial would go astray beyond its segment
+    # on a coast no later than the segment's end, beyond which the polynomial has no meaning
     to = direction(where(m.phase == COAST, minimum(t, m.arc.middle + 1.0 / m.arc.rate), t), m)
     return Outputs(
         x=s.x,

@@ -14,7 +14,7 @@ Corrections = namedtuple("Corrections", "gains offsets costs")
 
 
 def best_corrections(a, b, c, running, weight, terminal, sigma) -> Corrections:
-    """The corrections of least mean cost.
+    """The corrections of least mean cost, equations (3.25)-(3.30).
 
     a : float64[n, 2, 2];  b, c : float64[n, 2];  running, terminal : float64[2, 2];  weight : w
     """
@@ -33,7 +33,9 @@ def best_corrections(a, b, c, running, weight, terminal, sigma) -> Corrections:
 
 
 def planned_cost(b, costs, u, sigma) -> float:
-    """Mean cost that the execution errors of planned corrections u [n] leave, the later ones answering the earlier.
+    """Mean cost, in the unit of `costs`, that the execution errors of planned corrections leave if later ones answer.
+
+    u : float64[n], the corrections.
 
     Derived here from the recursion: correction k adds the variance (sigma u_k)^2 along b_k, which costs_{k+1} weighs.
     """

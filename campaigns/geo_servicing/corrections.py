@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from campaigns.geo_servicing.drift_model import DRIFT_PER_DV
 from campaigns.geo_servicing.dynamics import MU, RATE, SIDEREAL_DAY, longitudes
-from campaigns.geo_servicing.inputs import INSPECTION_LAWS, NAVIGATION, PHASES
+from campaigns.geo_servicing.inputs import CHOICES
 from campaigns.geo_servicing.inspection import next_coast, next_pair, relative_orbit, velocity_change
 from campaigns.geo_servicing.navigation import EXACT, NO_ESTIMATE, Error, Estimate, burnt, navigated_elements
 from campaigns.geo_servicing.plan_table import corrections, planned
@@ -60,9 +60,9 @@ class Memory(NamedTuple):
 @physics
 def start(o):
     """Before the first sample: what is due first, and when [s]."""
-    if o.phase == PHASES.inspection:
+    if o.phase == CHOICES.phase.inspection:
         return Memory(due=maximum(o.observation, FIRST_LOOK), mode=DECISION)
-    if o.phase == PHASES.phasing:
+    if o.phase == CHOICES.phase.phasing:
         if corrections(o.tables) > 0.5:
             return Memory(due=planned(o.tables, 0.0).ignition, mode=IGNITION)
     return Memory()
@@ -147,7 +147,7 @@ def execution(m, p, o):
     thrust = of_burn(m.burns, p.thrust_1, p.thrust_2, p.thrust_3, p.thrust_4, p.thrust_5)
     radial = of_burn(m.burns, p.radial_1, p.radial_2, p.radial_3, p.radial_4, p.radial_5)
     normal = of_burn(m.burns, p.normal_1, p.normal_2, p.normal_3, p.normal_4, p.normal_5)
-    if o.phase == PHASES.inspection:
+    if o.phase == CHOICES.phase.inspection:
         thrust = thrust + p.thrust_noise * m.d1
         radial, normal = radial + p.pointing_noise * m.d2, normal + p.pointing_noise * m.d3
     return thrust, radial, normal
@@ -161,7 +161,7 @@ def ignited(t, s, m, p, o):
     """
     dv = (
         phasing_change(t, s, m, p, o)
-        if o.phase == PHASES.phasing
+        if o.phase == CHOICES.phase.phasing
         else velocity_change(relative_orbit(s, m.estimate), 1.0 - m.second, p, o)
     )
     length = s.mass_left * p.exhaust / o.thrust * (1.0 - exp(-abs(dv) / p.exhaust))
@@ -182,12 +182,12 @@ def cut_off(m, o):
     filter there is a fix of its own, so that what is decided now does not share the errors of the ignition.
     """
     e, burn = m.estimate, m.burn
-    if o.navigation == NAVIGATION.filtered:
+    if o.navigation == CHOICES.navigation.filtered:
         # what the burn gave: the command, stretched and tilted
         size = abs(burn.dv)
         outward, ahead = size * burn.outward / o.thrust, size * burn.ahead / o.thrust
         e = burnt(e, outward, ahead - burn.dv, size, o.assumed_thrust, o.assumed_pointing)
-    elif o.navigation == NAVIGATION.raw:
+    elif o.navigation == CHOICES.navigation.raw:
         e = replace(e, r=m.after.r, s=m.after.s, u=m.after.u, w=m.after.w)
     return replace(m, burns=m.burns + 1.0, burn=replace(burn, outward=0.0, ahead=0.0, across=0.0), estimate=e)
 
@@ -214,7 +214,7 @@ def day_later(t, s, m, p):
 def decided(t, s, m, cut, p, o):
     """The memory of the inspection with the next coast and what ends it; cut : where a burn has just ended."""
     x = relative_orbit(s, m.estimate)
-    if o.inspection_law == INSPECTION_LAWS.pairs:
+    if o.inspection_law == CHOICES.inspection_law.pairs:
         second = where(cut, 1.0 - m.second, 0.0)
         coast, burns = where(second > 0.5, 0.5, next_pair(x, p, o)), 1.0
     else:
@@ -231,7 +231,7 @@ def switch(t, s, m, p, o, hit):
     decide, day = now & (m.mode == DECISION), now & (m.mode == DAY_LATER)
     m = where(hit.settle > 0.5, replace(m, settled=1.0), m)
     m = where(cut, cut_off(m, o), m)
-    if o.phase == PHASES.phasing:
+    if o.phase == CHOICES.phase.phasing:
         m = where(cut, next_correction(t, s, m, p, o), m)
         m = where(day, day_later(t, s, m, p), m)
     elif any_lane(cut | decide):

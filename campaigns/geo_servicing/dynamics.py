@@ -7,7 +7,7 @@ mean sidereal rate.  The servicing module flies in all phases, the target module
 from typing import Any
 
 from campaigns.geo_servicing import plan_table
-from campaigns.geo_servicing.inputs import PHASES
+from campaigns.geo_servicing.inputs import CHOICES
 from mc_engine.lanes import any_lane, atan2, physics, sincos, sqrt
 from mc_engine.model import states
 from mc_engine.physics.frames import half_turn, orbital_axes, turned
@@ -112,7 +112,7 @@ def rhs(t, s, m, p, o):
         ax, ay, az = ax + fx, ay + fy, az + fz
         flow = -push(m.burn) / p.exhaust
     ux, uy, uz, bx, by, bz, away = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    if o.phase == PHASES.inspection:
+    if o.phase == CHOICES.phase.inspection:
         bx, by, bz = field(t, s.target_x, s.target_y, s.target_z, sun, moon, p.target_light, p, o)
         ux, uy, uz = s.target_vx, s.target_vy, s.target_vz
     else:

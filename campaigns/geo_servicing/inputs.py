@@ -1,25 +1,9 @@
 """What can be set in a servicing campaign: parameters, which may differ from case to case, and settings."""
 
-from collections import namedtuple
-from typing import Any
-
 from campaigns.geo_servicing.plan_table import BURNS
-from mc_engine.model import Parameter, Setting, inputs
+from mc_engine.model import Parameter, Setting, choices, inputs
 from mc_engine.physics.geopotential import LARGEST_DEGREE
 
-
-def _words(*words: str) -> Any:
-    """The words of a setting, each with the number that stands for it in physics: PHASES.inspection is 1."""
-    made: Any = namedtuple("Words", words)  # type: ignore[misc]
-    return made(*map(float, range(len(words))))
-
-
-PHASES = _words("phasing", "inspection", "free")
-SCHEDULES = _words("published", "designed")
-AIMS = _words("fuel", "time")
-NAVIGATION = _words("perfect", "raw", "filtered")
-INSPECTION_LAWS = _words("single", "pairs")
-GEOMETRIES = _words("behind", "ahead", "around")
 BURN_NUMBERS = range(1, BURNS + 1)
 
 
@@ -85,7 +69,7 @@ Inputs = inputs(
     chi2=Parameter(0.0, "L12/L11 of the terminal matrix of the inspection law, rev", unit=""),
     control_weight=Parameter(0.0, "w/L11 of the inspection law", low=0.0, unit=""),
     coast_revolutions=Parameter(1.0, "coast that the inspection law assumes, m, in revolutions", low=0.5, unit=""),
-    phase=Setting("phasing", "task", choices=PHASES._fields),
+    phase=Setting("phasing", "task", choices=("phasing", "inspection", "free")),
     epoch_utc=Setting(
         "2019-01-01T12:00:00",
         "planned start of the flight, UTC",
@@ -122,11 +106,11 @@ Inputs = inputs(
     initial_node_deg=Setting(0.0, "right ascension of the ascending node at the start", low=-360.0, high=360.0),
     initial_true_anomaly_deg=_planned(0.0, "anomaly", -360.0, 360.0, "initial_true_anomaly_error_deg"),
     target_longitude_deg=Setting(95.0, "required longitude, east", low=-360.0, high=360.0),
-    schedule=Setting("designed", "the source's corrections, or the designed ones", choices=SCHEDULES._fields),
+    schedule=Setting("designed", "the source's corrections, or the designed ones", choices=("published", "designed")),
     planned_corrections=Setting(
         3.0, "number of corrections of the designed schedule", low=2, high=BURNS, whole=True, unit=""
     ),
-    aim=Setting("fuel", "what the designed schedule minimises", choices=AIMS._fields),
+    aim=Setting("fuel", "what the designed schedule minimises", choices=("fuel", "time")),
     aim_drift_deg_rev=Setting(0.012, "actual drift that the designed schedule ends with", low=-1.0, high=1.0),
     first_coast_h=Setting(12.0, "least coast before the first correction of the phasing", low=0.0),
     least_coast_h=Setting(6.0, "least coast before every later one, and between those of the inspection", low=0.0),
@@ -142,16 +126,16 @@ Inputs = inputs(
         4e-4, "tolerance of the final eccentricity, for the schedule", low=1e-7, high=0.1, unit=""
     ),
     feedback=Setting(True, "each correction is computed from the navigation state at ignition"),
-    navigation=Setting("filtered", "what navigation knows", choices=NAVIGATION._fields),
+    navigation=Setting("filtered", "what navigation knows", choices=("perfect", "raw", "filtered")),
     fix_period_s=Setting(3600.0, "time from one fix to the next", low=10.0, high=1e6),
     filter_noise_m_s2=Setting(1e-9, "1-sigma of the unmodelled acceleration that the filter assumes", low=0.0),
     assumed_thrust_pct=Setting(0.5, "1-sigma of the thrust error that laws and filter expect", low=0.0),
     assumed_pointing_deg=Setting(0.5, "1-sigma of the tilt that the filter expects", low=0.0),
-    geometry=Setting("behind", "position of the module relative to the target", choices=GEOMETRIES._fields),
+    geometry=Setting("behind", "position of the module relative to the target", choices=("behind", "ahead", "around")),
     inspection_law=Setting(
         "single",
         "one correction at a time, or pairs that remove the relative ellipse",
-        choices=INSPECTION_LAWS._fields,
+        choices=("single", "pairs"),
     ),
     observation_days=Setting(0.0, "time before the inspection first decides", low=0.0),
     settle_time_days=Setting(15.0, "time from which the inspection counts as settled", low=0.0),
@@ -159,3 +143,5 @@ Inputs = inputs(
     range_high_m=Setting(82.0, "largest settled range that counts as steady", low=0.0),
     tolerance=Setting(1e-11, "relative error of an integration step", low=1e-14, high=1e-6, unit=""),
 )
+
+CHOICES = choices(Inputs)

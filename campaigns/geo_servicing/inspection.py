@@ -6,7 +6,7 @@ Numbers in brackets are equations of the source (`model.SOURCE`); the procedure 
 from collections import namedtuple
 
 from campaigns.geo_servicing.dynamics import MU, R0, RATE, SIDEREAL_DAY
-from campaigns.geo_servicing.inputs import INSPECTION_LAWS
+from campaigns.geo_servicing.inputs import CHOICES
 from campaigns.geo_servicing.navigation import navigated_elements
 from mc_engine.lanes import atan2, floor, maximum, minimum, physics, sqrt, where
 from mc_engine.physics.frames import TURN, half_turn
@@ -120,6 +120,6 @@ def velocity_change(x, first, p, o):
     first : 1 for the first burn of a pair
     """
     u = asked(x.along - p.nominal, x.drift, p, o)
-    if o.inspection_law == INSPECTION_LAWS.pairs:
+    if o.inspection_law == CHOICES.inspection_law.pairs:
         u = where(first > 0.5, first_of_pair(x, p, o), u)
     return -u * RATE / (3.0 * TURN)

@@ -8,7 +8,7 @@ import numpy as np
 
 from campaigns.geo_servicing import corrections, dynamics, navigation, outcome, plan_table
 from campaigns.geo_servicing.dynamics import MU, R0, State
-from campaigns.geo_servicing.inputs import BURN_NUMBERS, GEOMETRIES, NAVIGATION, PHASES, Inputs
+from campaigns.geo_servicing.inputs import BURN_NUMBERS, CHOICES, Inputs
 from campaigns.geo_servicing.phasing_plan import plan_of
 from mc_engine.errors import ModelError
 from mc_engine.model import AdaptiveStep, Parameter, Refusals, kept_design, model, prepared
@@ -36,7 +36,7 @@ def prepare(i: SimpleNamespace, o: SimpleNamespace, refusals: Refusals) -> dict[
     """
     epoch = o.epoch_utc + i.epoch_error / _DAY
     sidereal = sidereal_angle(epoch)
-    two = o.phase == PHASES.inspection
+    two = o.phase == CHOICES.phase.inspection
     refusals.add(o.gravity_order > o.gravity_degree, "gravity_order is above gravity_degree")
     refusals.add(o.gravity_degree == 1.0, "the geopotential has no harmonics of degree 1; take 0, or 2 and above")
     mass = o.mass + i.mass_error
@@ -81,7 +81,7 @@ def phasing_start(i: SimpleNamespace, o: SimpleNamespace, sidereal, refusals: Re
 
 
 def craft_start(i: SimpleNamespace, name: str) -> np.ndarray:
-    """State float64[6, n] of the craft whose parameters begin with `name`."""
+    """State float64[6, n], SI, inertial axes, of the craft whose parameters begin with `name`."""
     own = SimpleNamespace(**{key.removeprefix(f"{name}_"): value for key, value in vars(i).items()})
     return state_of_elements(
         own.pericentre_radius / (1.0 - own.eccentricity),
@@ -100,9 +100,9 @@ def _inspection_rows(i: SimpleNamespace, o: SimpleNamespace) -> dict[str, np.nda
     The relative ellipse has the half axes R0 e outward and 2 R0 e ahead: it is between the ranges wanted if e is
     between low/R0 and high/(2 R0), and in the middle of that here.
     """
-    around = o.geometry == GEOMETRIES.around
+    around = o.geometry == CHOICES.geometry.around
     middle = 0.5 * (i.around_low / R0 + i.around_high / (2.0 * R0))
-    side = np.where(around, 0.0, np.where(o.geometry == GEOMETRIES.behind, -1.0, 1.0))
+    side = np.where(around, 0.0, np.where(o.geometry == CHOICES.geometry.behind, -1.0, 1.0))
     return {"nominal": side * i.standoff, "around": np.where(around, middle, 0.0)}
 
 
@@ -123,7 +123,7 @@ def _sun_moon_rows(epoch: np.ndarray, o: SimpleNamespace) -> dict[str, np.ndarra
 
 def tables(o: Any) -> np.ndarray:
     """The phasing plan and the harmonics of the geopotential, for the settings o."""
-    plan = kept_design(plan_of, *nominal_start(o)) if o.phase == PHASES.phasing else np.zeros(plan_table.LENGTH)
+    plan = kept_design(plan_of, *nominal_start(o)) if o.phase == CHOICES.phase.phasing else np.zeros(plan_table.LENGTH)
     return np.concatenate([plan, harmonics_table(int(o.gravity_degree), int(o.gravity_order)).ravel()])
 
 
@@ -139,14 +139,15 @@ def nominal_start(o: Any) -> tuple[Any, SimpleNamespace]:
     if refusals.mask.any():
         raise ModelError(f"there is no plan: {refusals.reason[0]}")
     # no plan yet, as in the tables of a free flight: for the phasing `tables` would ask for the plan itself
-    unplanned = np.concatenate([tables(o._replace(phase=PHASES.free)), columns.pop("tables").ravel()])
+    unplanned = np.concatenate([tables(o._replace(phase=CHOICES.phase.free)), columns.pop("tables").ravel()])
     first = {name: float(np.ravel(row)[0]) for name, row in columns.items()}
     return o._replace(tables=unplanned), SimpleNamespace(**first)
 
 
 def sample_period(o: Any) -> float:
     """Time [s] from one fix to the next; none are needed where nothing is drawn along the flight."""
-    return np.inf if o.navigation == NAVIGATION.perfect and o.phase != PHASES.inspection else float(o.fix_period)
+    nothing = o.navigation == CHOICES.navigation.perfect and o.phase != CHOICES.phase.inspection
+    return np.inf if nothing else float(o.fix_period)
 
 
 FIGURES = (

@@ -14,7 +14,7 @@ R. E. Kalman, Journal of Basic Engineering 82 (1960) 35-45; G. W. Hill, American
 from collections import namedtuple
 
 from campaigns.geo_servicing.dynamics import MU, RATE
-from campaigns.geo_servicing.inputs import NAVIGATION
+from campaigns.geo_servicing.inputs import CHOICES
 from mc_engine.lanes import physics, replace, sincos, where
 from mc_engine.lanes.noise import normal_pair
 from mc_engine.physics.frames import orbital_axes
@@ -132,9 +132,9 @@ def control(t, m, p, o, draws):
     d1, d2 = normal_pair(draws, 2)
     d3, _ = normal_pair(draws, 3)
     place, velocity, e = p.nav_position, p.nav_velocity, m.estimate
-    if o.navigation == NAVIGATION.raw:
+    if o.navigation == CHOICES.navigation.raw:
         e = single_fix(fix, place, velocity)
-    elif o.navigation == NAVIGATION.filtered:
+    elif o.navigation == CHOICES.navigation.filtered:
         going = propagated(e, o.fix_period, o.filter_noise * o.fix_period)
         e = where(t > 0.0, fixed(going, fix, place, velocity), single_fix(fix, place, velocity))
     return replace(m, estimate=e, after=fix_error(draws, 4, p), d1=d1, d2=d2, d3=d3)

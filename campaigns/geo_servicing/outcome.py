@@ -5,7 +5,7 @@ from typing import Any
 
 from campaigns.geo_servicing.corrections import ended
 from campaigns.geo_servicing.dynamics import SIDEREAL_DAY
-from campaigns.geo_servicing.inputs import PHASES
+from campaigns.geo_servicing.inputs import CHOICES
 from campaigns.geo_servicing.inspection import relative_orbit
 from campaigns.geo_servicing.navigation import EXACT
 from mc_engine.lanes import log, physics, sqrt, where
@@ -91,7 +91,7 @@ def period_error(drift):
 @physics
 def pair_of(s, o):
     """The module seen from the target [m], in its radial and transverse axes; missing in phases without a target."""
-    if o.phase == PHASES.inspection:
+    if o.phase == CHOICES.phase.inspection:
         rx, ry, rz, ax, ay, az, _, _, _ = orbital_axes(
             s.target_x, s.target_y, s.target_z, s.target_vx, s.target_vy, s.target_vz
         )
@@ -132,10 +132,10 @@ def observe(t, s, m, p, o):
 def evaluate(t, s, m, p, o, best):
     """The metrics at the end that are no value of a quantity, SI and radians."""
     end = m.end
-    if o.phase != PHASES.phasing:  # no transfer: where the module is at the end of the flight
+    if o.phase != CHOICES.phase.phasing:  # no transfer: where the module is at the end of the flight
         end = ended(t, s, p)
     near, far, settled_near, settled_far, steady, e, drift = NONE, NONE, NONE, NONE, NONE, NONE, NONE
-    if o.phase == PHASES.inspection:
+    if o.phase == CHOICES.phase.inspection:
         near, far, settled_near, settled_far = best.near, best.far, -best.settled_near, best.settled_far
         within = (m.settled > 0.5) & (settled_near >= o.range_low) & (settled_far <= o.range_high)
         true = relative_orbit(s, EXACT)

@@ -14,7 +14,7 @@ import scipy  # loads its packages when they are used
 from campaigns.geo_servicing.bellman import Corrections, best_corrections, planned_cost
 from campaigns.geo_servicing.drift_model import DRIFT_PER_DV, E_PER_DV, after_correction, braking, fastest, largest_last
 from campaigns.geo_servicing.dynamics import SIDEREAL_DAY
-from campaigns.geo_servicing.inputs import AIMS, SCHEDULES
+from campaigns.geo_servicing.inputs import CHOICES
 from campaigns.geo_servicing.plan_table import Row, plan_rows
 from campaigns.geo_servicing.planned_flight import Craft, End, Plan
 from mc_engine.errors import ModelError
@@ -36,7 +36,7 @@ Limits = namedtuple("Limits", "y v e coasts longest last")
 def plan_of(o: Any, first: Any) -> np.ndarray:
     """The table of the plan (see `plan_table`); o, first : see `Craft`."""
     craft = Craft(o, first)
-    plan = published_plan(craft) if o.schedule == SCHEDULES.published else design(craft)
+    plan = published_plan(craft) if o.schedule == CHOICES.schedule.published else design(craft)
     (ignition, longitude, drift), _ = craft.fly_plan(plan)
     gains = gains_of(craft, plan, limits_of(o)).gains
     return plan_rows(Row(ignition, plan.dv, longitude, drift, *gains.T))
@@ -109,7 +109,7 @@ def design(craft: Craft) -> Plan:
 
 def first_approximations(craft: Craft, limits: Limits) -> list[Plan]:
     """Plans to start the search from: the source's profiles at several lengths of the coasts; [s, m/s]."""
-    profile = braking if craft.o.aim == AIMS.fuel else fastest
+    profile = braking if craft.o.aim == CHOICES.aim.fuel else fastest
     plans = []
     for longer in (0.0, 0.25, 0.5):
         shortest = limits.coasts.copy()
@@ -141,7 +141,7 @@ def _best(craft: Craft, limits: Limits, lacking: End, starts: list[Plan]) -> Pla
 
 
 def _improved(craft: Craft, limits: Limits, lacking: End, start: Plan) -> tuple[float, Plan] | None:
-    """(cost [m/s or rev], plan) of least cost near a start; None where the limits cannot be met from there."""
+    """(cost [m/s] or [rev], plan) of least cost near a start; None where the limits cannot be met from there."""
     n = len(start.dv)
     signs = np.sign(start.dv)
 
@@ -156,7 +156,7 @@ def _improved(craft: Craft, limits: Limits, lacking: End, start: Plan) -> tuple[
         costs = gains_of(craft, candidate, limits).costs
         spread = planned_cost(b, costs, DRIFT_PER_DV * candidate.dv, craft.o.assumed_thrust)
         spent = (signs * candidate.dv).sum() + DV_OF_COST * spread
-        return modelled(craft, candidate, lacking).time + 0.02 * spent if craft.o.aim == AIMS.time else spent
+        return modelled(craft, candidate, lacking).time + 0.02 * spent if craft.o.aim == CHOICES.aim.time else spent
 
     def equal(z):
         """Longitude and drift at the end against those aimed at, in the unit of their limits."""

@@ -2,7 +2,7 @@
 
 import math
 
-from campaigns.reentry.inputs import US76
+from campaigns.reentry.inputs import CHOICES
 from mc_engine.lanes import any_lane, physics, sqrt, where
 from mc_engine.physics.atmosphere import us76_logarithm
 
@@ -33,7 +33,7 @@ def slow_sigma(h):
 @physics
 def logarithm_of_density(h, p, o):
     """(ln rho, its slope [1/m], temperature [K]) at altitude h [m], without the constant density factor."""
-    if o.atmosphere == US76:
+    if o.atmosphere == CHOICES.atmosphere.us76:
         value, slope, temperature = us76_logarithm(h)
     else:
         value, slope, temperature = p.log_density - p.inverse_scale * h, -p.inverse_scale, p.temperature

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from campaigns.reentry.inputs import DETRA_KEMP_RIDDELL, Inputs
+from campaigns.reentry.inputs import CHOICES, Inputs
 from campaigns.reentry.planets import of_planets
 from campaigns.reentry.vehicles import VEHICLES, Vehicle
 from mc_engine.model import Refusals
@@ -42,7 +42,9 @@ def airframe_rows(i: SimpleNamespace, settings: SimpleNamespace, airframe: Vehic
     per_mass = airframe.reference_area / (airframe.mass * i.mass_factor)
     nose = airframe.nose_radius * i.nose_radius_factor
     sutton_graves = of_planets(settings.planet, "heating") / np.sqrt(nose)
-    heating = np.where(settings.heating == DETRA_KEMP_RIDDELL, detra_kemp_riddell_coefficient(nose), sutton_graves)
+    heating = np.where(
+        settings.heating == CHOICES.heating.detra_kemp_riddell, detra_kemp_riddell_coefficient(nose), sutton_graves
+    )
     rows = airframe._asdict() | {
         "drag": drag * per_mass,
         "lift": lift * per_mass,

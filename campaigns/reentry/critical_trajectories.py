@@ -27,9 +27,10 @@ CriticalPeriapses = namedtuple("CriticalPeriapses", "capture entry")
 
 
 def boundary(inputs: Inputs, name: str, low: float, high: float, width: float, holds: Callable[..., np.ndarray]):
-    """Value of the input `name` at which `holds` becomes true, going from low to high, to within `width`.
+    """Value of the input `name` at which `holds` becomes true, going from low to high, in its unit.
 
-    holds : columns -> bool[n], false at low and true at high; ValueError if it is not.
+    holds : columns -> bool[n], false at low and true at high; ValueError if it is not
+    width : how closely the boundary is found
     """
     while high - low > width:
         values = np.linspace(low, high, CASES)

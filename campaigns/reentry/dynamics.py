@@ -9,7 +9,7 @@ from collections import namedtuple
 
 from campaigns.reentry.air import logarithm_of_density, sound_speed
 from campaigns.reentry.bank import angle_at
-from campaigns.reentry.inputs import APOLLO, FLAT, J2, NO_GRAVITY, STOP_ON_EXIT, SUTTON_GRAVES, UNGUIDED
+from campaigns.reentry.inputs import CHOICES
 from campaigns.reentry.vehicles import apollo_shares
 from campaigns.reentry.weather import weather_at
 from mc_engine.lanes import any_lane, atan2, exp, maximum, physics, replace, sincos, sqrt, where
@@ -88,7 +88,7 @@ def place_of(s, p, o):
 
     The altitude changes like r less the ellipsoid's radius: r' - (dR/d sin^2) (sin^2)', derived here with sin = z / r.
     """
-    if o.shape == FLAT:
+    if o.shape == CHOICES.shape.flat:
         place = Place(altitude=s.z, climb=s.vz, up=Vector(0.0, 0.0, 1.0))
     else:
         r2 = s.x * s.x + s.y * s.y + s.z * s.z
@@ -127,7 +127,7 @@ def air_of(s, place, p, o):
 def force_of(air, p, o):
     """Areas over mass [m^2/kg] in the flow about the craft; by the Mach number if the vehicle has curves over it."""
     force = Force(p.drag, p.lift, p.total, p.axial, p.sensed)
-    if o.vehicle == APOLLO:
+    if o.vehicle == CHOICES.vehicle.apollo:
         of_drag, of_lift = apollo_shares(air.speed / sound_speed(air.temperature))
         drag, lift = of_drag * p.drag, of_lift * p.lift
         force = Force(
@@ -143,7 +143,7 @@ def exposure_of(s, p, o):
     """The `Exposure` of a state, SI: dynamic pressure rho V^2 / 2, convective heat rate at the stagnation point."""
     place = place_of(s, p, o)
     air = air_of(s, place, p, o)
-    if o.heating == SUTTON_GRAVES:
+    if o.heating == CHOICES.heating.sutton_graves:
         flux = sutton_graves(air.density, air.speed, p.heating)
     else:
         flux = detra_kemp_riddell(air.density, air.speed, p.heating)
@@ -153,13 +153,13 @@ def exposure_of(s, p, o):
 @physics
 def field(s, p, o):
     """Acceleration [m/s^2] by gravity and, on a turning planet, the centrifugal force."""
-    if o.gravity == NO_GRAVITY:
+    if o.gravity == CHOICES.gravity.none:
         g = Vector(0.0, 0.0, 0.0)
-    elif o.shape == FLAT:
+    elif o.shape == CHOICES.shape.flat:
         g = Vector(0.0, 0.0, -p.gravity)
     else:
         g = Vector(*point_mass(s.x, s.y, s.z, p.mu))
-    if o.gravity == J2:
+    if o.gravity == CHOICES.gravity.j2:
         g = added(g, Vector(*j2_perturbation(s.x, s.y, s.z, p.mu)))
     centrifugal = p.rate * p.rate
     return Vector(g.x + centrifugal * s.x, g.y + centrifugal * s.y, g.z)
@@ -168,7 +168,7 @@ def field(s, p, o):
 @physics
 def bank_of(t, m, o):
     """(cosine, sine) of the bank angle [rad]; the sine is 0 in a planar flight."""
-    if o.guidance == UNGUIDED:
+    if o.guidance == CHOICES.guidance.none:
         cosine, sine = m.met.lift.cos_bank, m.met.lift.sin_bank
     else:
         sine, cosine = sincos(angle_at(t, m.steering.turn, o.guidance_period))
@@ -205,11 +205,11 @@ def crossings(t, s, m, p, o):
     braking = 0.5 * air.density * force.drag * (v2 * air.speed)
     gain = dot(air.v, field(s, p, o)) - braking + air.shear * place.climb
     thicker = air.slope * place.climb * v2
-    power = 3.0 if o.heating == SUTTON_GRAVES else DKR_EXPONENT
+    power = 3.0 if o.heating == CHOICES.heating.sutton_graves else DKR_EXPONENT
     sine = dot(velocity(s), place.up) / where(air.speed > 0.0, air.speed, 1.0)  # winds are level
     rolls = m.met.lift.rolls
     above = place.altitude - p.exit
-    stops = o.on_exit == STOP_ON_EXIT
+    stops = o.on_exit == CHOICES.on_exit.stop
     return Events(
         pressure_peak=thicker + 2.0 * gain,
         heat_peak=0.5 * thicker + power * gain,
@@ -245,7 +245,7 @@ def exit_of(t, s, p, o):
     The apoapsis is that of a point mass; on a hyperbola, and over a flat Earth, it is not a number.
     """
     v = norm(velocity(s))
-    if o.shape == FLAT:
+    if o.shape == CHOICES.shape.flat:
         angle, inertial, apoapsis = atan2(s.vz, sqrt(s.vx * s.vx + s.vy * s.vy)), v, NAN
     else:
         angle = velocity_angles(s.x, s.y, s.z, s.vx, s.vy, s.vz)[0]

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from campaigns.reentry.air import GAS_CONSTANT
-from campaigns.reentry.inputs import ELLIPSOID, FLAT, HYPERBOLA, INERTIAL
+from campaigns.reentry.inputs import CHOICES
 from campaigns.reentry.planets import of_planets
 from mc_engine.model import Refusals
 from mc_engine.physics.frames import (
@@ -34,7 +34,7 @@ def world_of(i: SimpleNamespace, settings: SimpleNamespace) -> World:
     The temperature [K] is that of the exponential atmosphere, g H0 / R.
     """
     radius = np.where(i.surface_radius > 0.0, i.surface_radius, of_planets(settings.planet, "radius"))
-    e2 = np.where(settings.shape == ELLIPSOID, of_planets(settings.planet, "e2"), 0.0)
+    e2 = np.where(settings.shape == CHOICES.shape.ellipsoid, of_planets(settings.planet, "e2"), 0.0)
     mu = of_planets(settings.planet, "mu")
     gravity = mu / radius**2
     density, scale = of_planets(settings.planet, "air").T
@@ -57,7 +57,9 @@ def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusa
     def over_ground(speed, path, heading, radius, latitude):
         """North, east, up of the velocity over ground [m/s]; the arguments are in the frame speed_frame."""
         carried = carried_along(radius, latitude, world.rate)
-        return velocity_components(speed, path, heading) - np.where(settings.speed_frame == INERTIAL, carried, 0.0)
+        return velocity_components(speed, path, heading) - np.where(
+            settings.speed_frame == CHOICES.speed_frame.inertial, carried, 0.0
+        )
 
     radius, altitude = _height(i, world)
     speed, path = _arrival(i, settings, world, radius, refusals)
@@ -83,7 +85,7 @@ def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusa
     radius = radius + i.entry_altitude_error
     north, east, up = over_ground(speed, path, i.entry_heading + i.entry_heading_error, radius, latitude)
     to_north, to_east, place = local_axes(latitude, longitude)
-    flat, zero = settings.shape == FLAT, np.zeros_like(radius)
+    flat, zero = settings.shape == CHOICES.shape.flat, np.zeros_like(radius)
     flat_ahead, flat_right = turned(north, east, np.cos(heading), np.sin(heading))
     # minus zero would fly to other bits than zero does
     return Entry(
@@ -110,7 +112,7 @@ def _arrival(i: SimpleNamespace, settings: SimpleNamespace, world: World, radius
     radius or the case joins `refusals`.  Speed [m/s], angle [rad]; derived here from their
     conservation on the hyperbola.
     """
-    comes = settings.arrival == HYPERBOLA
+    comes = settings.arrival == CHOICES.arrival.hyperbola
     periapsis = world.radius + i.vacuum_periapsis
     speed = np.sqrt(i.excess_speed**2 + 2.0 * world.mu / radius)
     cosine = periapsis * np.sqrt(i.excess_speed**2 + 2.0 * world.mu / periapsis) / (radius * speed)

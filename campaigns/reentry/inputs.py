@@ -2,7 +2,7 @@
 
 from campaigns.reentry.planets import PLANETS
 from campaigns.reentry.vehicles import VEHICLES
-from mc_engine.model import Parameter, Setting, inputs
+from mc_engine.model import Parameter, Setting, choices, inputs
 
 GUIDANCE = ("none", "law1", "law2", "law2r", "law3", "law3r", "apollo")
 
@@ -151,20 +151,4 @@ Inputs = inputs(
     time_limit_s=Setting(20_000.0, "longest flight; a case that has not ended by then is no-stop", low=1.0),
 )
 
-
-def _code(name: str, word: str) -> float:
-    """The number that stands for a word of a setting inside physics."""
-    return next(float(item.code(word)) for item in Inputs.declared if item.name == name)
-
-
-EARTH = _code("planet", "earth")
-ELLIPSOID, FLAT = _code("shape", "ellipsoid"), _code("shape", "flat")
-J2, NO_GRAVITY = _code("gravity", "j2"), _code("gravity", "none")
-US76 = _code("atmosphere", "us76")
-SUTTON_GRAVES, DETRA_KEMP_RIDDELL = _code("heating", "sutton_graves"), _code("heating", "detra_kemp_riddell")
-INERTIAL = _code("speed_frame", "inertial")
-HYPERBOLA = _code("arrival", "hyperbola")
-APOLLO = _code("vehicle", "apollo")
-STOP_ON_EXIT = _code("on_exit", "stop")
-PLAN_IS_GIVEN = _code("plan", "given")
-UNGUIDED, LAW1, LAW2, LAW2R, LAW3, LAW3R, APOLLO_LAW = (_code("guidance", law) for law in GUIDANCE)
+CHOICES = choices(Inputs)

@@ -12,7 +12,7 @@ from campaigns.reentry.entry_state import Planned, World, entry_of, world_of
 from campaigns.reentry.guidance import laws
 from campaigns.reentry.guidance.plan import planned_entry, plans_of
 from campaigns.reentry.guidance.reference import stored_references
-from campaigns.reentry.inputs import DETRA_KEMP_RIDDELL, EARTH, FLAT, J2, US76, Inputs
+from campaigns.reentry.inputs import CHOICES, Inputs
 from mc_engine.model import AdaptiveStep, Event, Refusals, model, prepared
 from mc_engine.model.figures import (
     CorridorFigure,
@@ -44,7 +44,7 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
     altitude = entry.planned.altitude
     refusals.add(altitude <= inputs.stop_altitude, "the entry is not above stop_altitude_km")
     plan = plans_of(inputs, settings, world, planned, airframe)
-    guided = settings.guidance > 0.5
+    guided = settings.guidance != CHOICES.guidance.none
     refusals.add(guided & ~(plan.lift_to_drag > 0.0), "a guidance law needs a vehicle with lift")
     references = stored_references(plan, guided, FIRST, refusals)
     rows = vars(inputs) | world._asdict() | _axes("", entry.position) | _axes("v", entry.velocity)
@@ -65,15 +65,16 @@ def _axes(letters: str, vectors: np.ndarray) -> dict[str, np.ndarray]:
 
 def _refuse_what_does_not_fit(settings: SimpleNamespace, refusals: Refusals) -> None:
     """Scenarios that contradict themselves."""
-    other, flat, weather = settings.planet != EARTH, settings.shape == FLAT, settings.weather > 0.5
-    j2, by_air = settings.gravity == J2, settings.heating == DETRA_KEMP_RIDDELL
+    other, flat = settings.planet != CHOICES.planet.earth, settings.shape == CHOICES.shape.flat
+    weather, j2 = settings.weather > 0.5, settings.gravity == CHOICES.gravity.j2
+    by_air = settings.heating == CHOICES.heating.detra_kemp_riddell
     for mask, sentence in (
-        (other & (settings.atmosphere == US76), 'the atmosphere "us76" is that of the Earth'),
+        (other & (settings.atmosphere == CHOICES.atmosphere.us76), 'the atmosphere "us76" is that of the Earth'),
         (other & j2, 'the gravity "j2" is that of the Earth; take "point"'),
         (other & weather, "the random air of weather = true is that of the Earth"),
         (other & by_air, 'the heating "detra_kemp_riddell" is that of the Earth\'s air'),
         (flat & weather, "a flat Earth has no weather"),
-        (flat & (settings.guidance > 0.5), "the guidance laws want a round planet"),
+        (flat & (settings.guidance != CHOICES.guidance.none), "the guidance laws want a round planet"),
         (flat & (settings.rotating > 0.5), "a flat Earth does not turn; set rotating = false"),
         (flat & j2, 'a flat Earth has the gravity "point", which is uniform, or "none"'),
     ):
@@ -111,7 +112,7 @@ def _target(i: SimpleNamespace, world: World, planned: Planned, end: np.ndarray)
 
 
 def _case_tables(i: SimpleNamespace, settings: SimpleNamespace, references: np.ndarray) -> dict[str, np.ndarray]:
-    """Reference paths, then the air of each case, float64[n], and the index at which that begins."""
+    """Reference paths, then the air of each case, SI, and the index at which that begins, float64[n]."""
     asked = settings.weather > 0.5
     if not asked.any():
         return {"weather": np.zeros(asked.size), "tables": references}
@@ -175,7 +176,7 @@ MODEL = model(
         "time_limit",
         "tolerance",
         (1e-5, 1e-5, 1e-5, 1e-8, 1e-8, 1e-8, 10.0),
-        control_period=lambda o: o.guidance_period if o.guidance > 0.5 else np.inf,
+        control_period=lambda o: o.guidance_period if o.guidance != CHOICES.guidance.none else np.inf,
         method="dp54",
         attempts=50_000,
     ),

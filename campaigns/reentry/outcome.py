@@ -5,7 +5,7 @@ from collections import namedtuple
 from campaigns.reentry.air import sound_speed
 from campaigns.reentry.bank import angle_at
 from campaigns.reentry.dynamics import NAN, PullOut, exit_of, exposure_of, from_planned_entry, moment_of, velocity
-from campaigns.reentry.inputs import FLAT, STOP_ON_EXIT, UNGUIDED
+from campaigns.reentry.inputs import CHOICES
 from mc_engine.lanes import atan2, physics, sqrt, where
 from mc_engine.model import Field, at_end, metrics, outputs
 from mc_engine.physics.frames import TURN, full_turn, geodetic_latitude, spherical, velocity_angles
@@ -95,7 +95,7 @@ def ground_of(s, altitude, p, o):
     Downrange is the arc along the planned great circle, crossrange the arc from it, on a sphere of the planet's radius.
     Downrange goes on beyond the antipodes, from a quarter of a turn behind the entry place to three quarters ahead.
     """
-    if o.shape == FLAT:
+    if o.shape == CHOICES.shape.flat:
         latitude, longitude, downrange, crossrange = 0.0, 0.0, s.x, -s.y
         path = atan2(s.vz, sqrt(s.vx * s.vx + s.vy * s.vy))
         heading = p.heading + atan2(-s.vy, s.vx)
@@ -115,7 +115,7 @@ def observe(t, s, m, p, o):
     """Outputs, SI and radians."""
     place, air, force, pressure, flux = exposure_of(s, p, o)
     ground = ground_of(s, place.altitude, p, o)
-    if o.guidance == UNGUIDED:
+    if o.guidance == CHOICES.guidance.none:
         bank = atan2(m.met.lift.sin_bank, m.met.lift.cos_bank)
     else:
         bank = angle_at(t, m.steering.turn, o.guidance_period)
@@ -143,7 +143,7 @@ def observe(t, s, m, p, o):
 def target_of(p, o):
     """(geodetic latitude, longitude) of the target [rad], not numbers without one or over a flat Earth."""
     latitude, longitude = NAN, NAN
-    if o.shape != FLAT:
+    if o.shape != CHOICES.shape.flat:
         # at the altitude where the flight ends, so that a hit lies no distance from it
         r = p.polar_radius / sqrt(1.0 - p.e2 * (1.0 - p.tz * p.tz)) + p.stop_altitude
         latitude = geodetic_latitude(r * p.tx, r * p.ty, r * p.tz, p.stop_altitude, p.polar_radius, p.e2)
@@ -161,7 +161,7 @@ def evaluate(t, s, m, p, o):
     hottest = where(now.flux > met.hottest.flux, now, met.hottest)
     lowest = where(met.pull_out.time >= 0.0, met.pull_out, PullOut(now.altitude, t))
     ground = ground_of(s, now.altitude, p, o)
-    leaves = (o.on_exit == STOP_ON_EXIT) & (now.altitude > p.exit - 1e-3) & (ground.path > 0.0)
+    leaves = (o.on_exit == CHOICES.on_exit.stop) & (now.altitude > p.exit - 1e-3) & (ground.path > 0.0)
     first = where(leaves, exit_of(t, s, p, o), met.first_exit)
     violations = (
         where(pressed.load > p.corridor_load, 1.0, 0.0)
@@ -171,7 +171,7 @@ def evaluate(t, s, m, p, o):
     )
     miss_down, miss_cross = ground.downrange - p.aim_down, ground.crossrange - p.target_crossrange
     target_latitude, target_longitude = target_of(p, o)
-    reference_range = NAN if o.guidance == UNGUIDED else p.planned_range
+    reference_range = NAN if o.guidance == CHOICES.guidance.none else p.planned_range
     sampled = steering.samples > 0.0
     return Metrics(
         peak_load=pressed.load,

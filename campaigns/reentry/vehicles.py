@@ -31,8 +31,8 @@ class Vehicle(NamedTuple):
 # sphere; trim angle this study's.
 _APOLLO = Vehicle(5498.22, 12.017, 1.2891, 0.38773, trim_angle=float(np.radians(20.0)), nose_radius=3.05)
 _DRAG_PER_HYPERSONIC, _LIFT_PER_HYPERSONIC = 1.0 / _APOLLO.drag_coefficient, 1.0 / _APOLLO.lift_coefficient
-APOLLO_DRAG = curve("apollo_over_mach.csv", x="mach", y="drag_coefficient")
-APOLLO_LIFT = curve("apollo_over_mach.csv", x="mach", y="lift_coefficient")
+APOLLO_DRAG = curve("apollo_over_mach.csv", x="mach", y="drag_coefficient", y_unit="")
+APOLLO_LIFT = curve("apollo_over_mach.csv", x="mach", y="lift_coefficient", y_unit="")
 
 VEHICLES = {
     "apollo": _APOLLO,

@@ -66,7 +66,7 @@ def normal_deviates(draw: np.ndarray, count: int) -> np.ndarray:
 
 
 def gauss_markov(deviates: np.ndarray, length: float) -> np.ndarray:
-    """float64[n, NODES] of unit variance, correlation exp(-distance / length), from as many deviates."""
+    """float64[n, NODES] without unit, of variance 1 and correlation exp(-distance / length), from as many deviates."""
     a = np.exp(-SPACING / length)
     out = np.empty_like(deviates)
     out[:, 0] = deviates[:, 0]
@@ -76,7 +76,7 @@ def gauss_markov(deviates: np.ndarray, length: float) -> np.ndarray:
 
 
 def weather_nodes(draw: np.ndarray, density_size, wind_size, mean_size) -> np.ndarray:
-    """float64[n, LENGTH]: the profiles of n cases, node after node, its three fields side by side, then the depth.
+    """float64[n, LENGTH]: the profiles of n cases, node after node, its fields side by side, SI, then the depth.
 
     draw : in [0, 1), 0 for no random part;  density_size, wind_size, mean_size : multiples of the magnitudes above
     """
@@ -94,7 +94,7 @@ def weather_nodes(draw: np.ndarray, density_size, wind_size, mean_size) -> np.nd
 
 
 def _random_part(deviates: np.ndarray, sizes: np.ndarray, altitudes: np.ndarray) -> np.ndarray:
-    """float64[n, NODES, FIELDS] for sizes [FIELDS, n]: the sum of the two scales, half of the variance each."""
+    """float64[n, NODES, FIELDS] for sizes [FIELDS, n], SI: the sum of the two scales, half of the variance each."""
     deviates = deviates.reshape(-1, FIELDS, 2, NODES)
     out = np.empty((len(deviates), NODES, FIELDS))
     for field, column in enumerate((1, 2, 2)):

@@ -24,7 +24,7 @@ from mc_engine.sampling.correlation import correlated, gaussian_copula
 from mc_engine.sampling.designs import BY_LEVELS, IN_BLOCKS, sobol_key
 from mc_engine.sampling.distributions import quantiles
 from mc_engine.sampling.sobol import MAX_DIMENSIONS, scrambled_sobol
-from mc_engine.sampling.streams import uniforms
+from mc_engine.sampling.streams import uniform_columns, uniforms
 from mc_engine.suggestions import hint
 
 if TYPE_CHECKING:
@@ -154,12 +154,13 @@ def companion_table(campaign: "Campaign", case_ids: np.ndarray) -> dict[str, np.
     assert campaign.sensitivity is not None  # a companion has one
     names = [dispersion.name for dispersion in campaign.dispersions]
     pairs = rank_pairs(campaign.correlations)
-    points = [_point_columns(campaign, names, pairs, k, block) for k in range(len(_POINTS))]
+    blocks, at = np.unique(block, return_inverse=True)  # the rows of a block share its points
+    points = [_point_columns(campaign, names, pairs, k, blocks) for k in range(len(_POINTS))]
     table = {}
     for place, dispersion in enumerate(campaign.dispersions):
         group = next(name for name, members in campaign.sensitivity.groups.items() if dispersion.name in members)
         taken = layout.points(group)[row]
-        u = np.choose(taken, [columns[place] for columns in points], mode="clip")
+        u = np.choose(taken, [columns[place][at] for columns in points], mode="clip")
         assert dispersion.distribution is not None  # of a random design
         drawn, nominal = quantiles(dispersion.distribution, u), campaign.nominal[dispersion.name]
         table[dispersion.name] = np.where(taken == NOMINAL, nominal, drawn) if group in layout.held else drawn
@@ -167,19 +168,23 @@ def companion_table(campaign: "Campaign", case_ids: np.ndarray) -> dict[str, np.
 
 
 def _point_columns(
-    campaign: "Campaign", names: Sequence[str], pairs: tuple[tuple[str, str, float], ...], k: int, block: np.ndarray
+    campaign: "Campaign", names: Sequence[str], pairs: tuple[tuple[str, str, float], ...], k: int, blocks: np.ndarray
 ) -> list[np.ndarray]:
     """Uniform numbers of the k-th point of each block, a column a dispersion, correlated as the campaign's.
 
     A and B are one point of a scrambled Sobol' sequence of twice the dimensions; C, and what names a draw, is random.
     """
-    columns = []
-    for place, name in enumerate(names):
-        dimension, stream = 2 * place + k, f"{name}/{DESIGN} {_POINTS[k]}"
-        if k < 2 and dimension < MAX_DIMENSIONS and not names_a_draw(campaign.model, name):
-            columns.append(scrambled_sobol(sobol_key(f"{campaign.seed}/{stream}"), dimension, block))
-        else:
-            columns.append(uniforms(campaign.seed, stream, block))
+    streams = [f"{name}/{DESIGN} {_POINTS[k]}" for name in names]
+    columns = list(uniform_columns(campaign.seed, streams, blocks))
+    in_sequence = [
+        place
+        for place, name in enumerate(names)
+        if k < 2 and 2 * place + k < MAX_DIMENSIONS and not names_a_draw(campaign.model, name)
+    ]
+    keys = [sobol_key(f"{campaign.seed}/{streams[place]}") for place in in_sequence]
+    points = scrambled_sobol(keys, [2 * place + k for place in in_sequence], blocks)
+    for place, column in zip(in_sequence, points, strict=True):
+        columns[place] = column
     return correlated(gaussian_copula, columns, names, pairs)
 
 

@@ -101,7 +101,7 @@ def _column_tables(model: Model, level: str) -> Iterator[str]:
 _INTRODUCTION = {
     "Metrics": "One number a case.",
     "States": "What the integrator carries; its last value stands in the table of cases.",
-    "Histories": "Along the flight of the retained cases, besides `case_id`, `t_s` and the states.",
+    "Histories": "Along the flight of the cases whose history is saved, besides `case_id`, `t_s` and the states.",
 }
 
 

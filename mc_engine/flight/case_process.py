@@ -100,7 +100,7 @@ class CaseProcess:
                 yield reply
         except (EOFError, ConnectionError):
             code = self._process.wait()
-            raise CaseEnded(CRASHED, f"{how_it_ended(code)}{_place(end_of(self.work / STDERR))}") from None
+            raise CaseEnded(CRASHED, f"{how_it_ended(code)}{_crash_site(end_of(self.work / STDERR))}") from None
 
     def _wait(self, limit_s: float | None, stopped: Callable[[], bool]) -> None:
         begin = time.monotonic()
@@ -134,7 +134,7 @@ class CaseProcess:
         shutil.rmtree(self.work, ignore_errors=True)
 
 
-def _place(stderr: bytes) -> str:
+def _crash_site(stderr: bytes) -> str:
     """Where a process crashed, by the lines that Python's faulthandler wrote; else the last lines of stderr."""
     lines = stderr.decode(errors="replace").splitlines()
     for number, line in enumerate(lines):

@@ -19,15 +19,25 @@ from typing import Any
 import numpy as np
 
 from mc_engine.campaign.cases import case_table, full_inputs
+from mc_engine.campaign.columns import END_TIME
 from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.errors import EngineError
 from mc_engine.flight.flight import fly, fly_interpreted, grid_of
 from mc_engine.flight.flyer import NOMINAL_NOISE
-from mc_engine.flight.kernel import build_kernel
+from mc_engine.flight.kernel import build_kernel, clock_number
 from mc_engine.flight.kernel_parts import watching_events
-from mc_engine.flight.lost_numbers import first_lost
-from mc_engine.flight.repeatability import influences, model_digests, nominal_inputs, note_environment
+from mc_engine.flight.lost_numbers import not_finite
+from mc_engine.flight.repeatability import (
+    Columns,
+    first_difference,
+    influences,
+    model_digests,
+    nominal_inputs,
+    note_environment,
+    other_bits,
+    results,
+)
 from mc_engine.garbage_collection import collect_rarely
 from mc_engine.lanes.kernel_cache import form_of, kept_or_made
 from mc_engine.model.faults import MORE, fault_of
@@ -36,20 +46,20 @@ from mc_engine.model.phases import due_field, noted_field
 from mc_engine.model.record import Model, compiled_model
 from mc_engine.model.trial import fixed_metrics
 from mc_engine.sampling.distributions import column, quantiles
-from mc_engine.status import NOT_FINITE, OK, STATUS_NAME, STATUS_TEXT
+from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
 from mc_engine.suggestions import listed
 
 _CASES = 32
 _BLOCKS = 4  # of lanes that they fill at most
-_CUT = 5  # cases of the smaller part when they are flown in two
 # where along its distribution an input is tried: not at its edges alone, where what works evenly does the same
 _PLACES = np.array([0.05, 0.8, 0.95])
 _PARTNERS = 4  # cases in which an input is tried that does nothing in the nominal case
 LONGEST_S = 10.0  # of the flight of one case: with it, all that is flown here takes some minutes
 _INTERPRETED_S = 10.0  # of the nominal case flown by Python: the kernel that it spares takes about as long to compile
+_NOMINAL = np.array([NOMINAL_NOISE])
+_GROSS = 0.1  # of the size of the states; halving changed sound steps by 0.03 at most, unstable ones by 1 to 100
+_ROUNDED = 1e-6  # of a step: a billion steps as numbers of 16 digits miss `until` by less
 _ZERO = 1e-6  # of an event function's reach: a flight that stops there has reached the zero
-
-Columns = Mapping[str, np.ndarray]
 
 
 def faults(campaign: Campaign) -> list[str]:
@@ -64,10 +74,11 @@ def faults(campaign: Campaign) -> list[str]:
     try:
         nominal = _fly_nominal(campaign)
         with _completed_within(_BLOCKS * LONGEST_S, f"the first {ids.size} cases have", campaign):
-            flown = _results(campaign, inputs, ids)
-        lost = _not_finite(campaign, inputs, ids, flown, nominal)
-        faults_of_flight = [*(lost or _none_completing(campaign, flown)), *_other_bits(campaign, inputs, ids, flown)]
+            flown = results(campaign, inputs, ids)
+        lost = _too_long(campaign, nominal) or not_finite(campaign, inputs, ids, flown, nominal)
+        faults_of_flight = [*(lost or _none_completing(campaign, flown)), *other_bits(campaign, inputs, ids, flown)]
         return faults_of_flight or [
+            *_past_until(campaign, nominal),
             *_never_set(campaign, flown),
             *_always_the_same(campaign, flown),
             *_moving_nothing(campaign, inputs, ids),
@@ -82,11 +93,11 @@ def faults(campaign: Campaign) -> list[str]:
 def _fly_nominal(campaign: Campaign) -> Columns:
     """Fly the nominal case, after a single step of it that compiles the kernel; end the process with a sentence if it
     is not completed."""
-    clock, inputs, ids = compiled_model(campaign.model).clock, campaign.nominal, np.array([NOMINAL_NOISE])
+    clock = compiled_model(campaign.model).clock
     one_step = replace(clock, attempts=1) if isinstance(clock, AdaptiveStep) else replace(clock, until=clock.step)
-    fly(compiled_model(campaign.model), inputs, ids, campaign.seed, folder=campaign.directory, clock=one_step)
+    results(campaign, campaign.nominal, _NOMINAL, one_step)
     with _completed_within(LONGEST_S, "the nominal case has", campaign):
-        return _results(campaign, inputs, ids)
+        return results(campaign, campaign.nominal, _NOMINAL)
 
 
 @contextmanager
@@ -118,8 +129,56 @@ def _length(campaign: Campaign) -> str:
     return f"its clock allows {what}; {fix}{stops}, or leave the flight out with `mc-engine check --no-model`"
 
 
-def _results(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> dict[str, np.ndarray]:
-    return fly(compiled_model(campaign.model), inputs, ids, campaign.seed, folder=campaign.directory)
+def _too_long(campaign: Campaign, nominal: Columns) -> list[str]:
+    """One sentence if the nominal case ends grossly elsewhere with half of the step of a multistep method.
+
+    Beyond the method's limit of stability errors grow at every step, and finite numbers that are absurd are ok.
+    """
+    model, (_, settings) = compiled_model(campaign.model), nominal_inputs(campaign)
+    clock = model.clock
+    if not isinstance(clock, FixedStep) or clock.method == "rk4":
+        return []
+    n_steps, step, every = grid_of(clock, settings)
+    half = replace(clock, step=0.5 * step, until=n_steps * step, control_every=2 * every)
+    with _completed_within(2.0 * LONGEST_S, "with half of its step the nominal case has", campaign):
+        finer = results(campaign, campaign.nominal, _NOMINAL, half)
+    name, coarse, fine = "status", nominal["status"][0], finer["status"][0]
+    if coarse == fine:
+        begun = results(campaign, campaign.nominal, _NOMINAL, replace(clock, until=clock.step))
+        name = _far(model, begun, nominal, finer) if coarse == STATUS_NAME[OK] else ""
+        if not name:
+            return []
+        coarse, fine = (f"{row[name][0]:.3g}" for row in (nominal, finer))
+    return [f'steps of {step:g} s are too long for "{clock.method}": the nominal case has the {name} {coarse}, with '
+            f"half of the step {fine}; take shorter steps, see the limits of stability in `FixedStep`, and then let "
+            "`mc-engine bench --methods` find the fastest method of that accuracy"]  # fmt: skip
+
+
+def _far(model: Model, begun: Columns, coarse: Columns, fine: Columns) -> str:
+    """The end time or the first end state that differs grossly between two flights of a case; empty if there is none.
+
+    begun : the case after one step.  States of one unit, such as those of a position, have one size.
+    """
+    units = {END_TIME: END_TIME} | {f"end_{state.name}": state.unit for state in model.states}
+    sizes = dict.fromkeys(units.values(), 0.0)
+    for name, unit in units.items():
+        sizes[unit] = max(sizes[unit], abs(begun[name][0]), abs(fine[name][0]))
+    far = (name for name, unit in units.items() if abs(coarse[name][0] - fine[name][0]) > _GROSS * sizes[unit])
+    return next(far, "")
+
+
+def _past_until(campaign: Campaign, nominal: Columns) -> Iterator[str]:
+    """One sentence if the nominal case flies past `until` in its last step, with the times and the step that fit."""
+    clock, (_, settings) = compiled_model(campaign.model).clock, nominal_inputs(campaign)
+    if not isinstance(clock, FixedStep):
+        return
+    (n, step, _), until = grid_of(clock, settings), clock_number(clock.until, settings)
+    if nominal[END_TIME][0] - until > _ROUNDED * step:
+        ends = " or ".join(f"{k * step:.15g} s" for k in (n - 1, n) if k)
+        yield (
+            f"the clock's `until` is {until:.15g} s, and flights end at {n * step:.15g} s, after {n:,} steps of "
+            f"{step:.15g} s; take an `until` of {ends}, or steps of {until / n:.15g} s"
+        )
 
 
 def _none_completing(campaign: Campaign, flown: Columns) -> Iterator[str]:
@@ -148,54 +207,6 @@ def _no_stop(model: Model) -> str:
         happens, look_at = "acts", "its direction, its delay `after`"
     return (f"no stopping event {happens} before the time limit, of {own}; look at its function, {look_at} and the "
             "clock's `until`")  # fmt: skip
-
-
-def _not_finite(
-    campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, flown: Columns, nominal: Columns
-) -> list[str]:
-    """One sentence with the line of the model if a flight ended not-finite: the nominal one, or the first of these."""
-    word = STATUS_NAME[NOT_FINITE]
-    bad = np.flatnonzero(flown["status"] == word)
-    own: tuple[Mapping[str, Any], int, str] = campaign.nominal, NOMINAL_NOISE, "the nominal case"
-    if nominal["status"][0] != word:
-        if not bad.size:
-            return []
-        row = {name: value[bad[0]] if np.ndim(value) else value for name, value in inputs.items()}
-        own = row, int(ids[bad[0]]), f"case {ids[bad[0]]}"
-    sentence = first_lost(compiled_model(campaign.model), own[0], own[1], campaign.seed, own[2])
-    return [f"{sentence}; {bad.size} of the first {ids.size} cases end {word}"] if sentence else []
-
-
-def _other_bits(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, flown: Columns) -> Iterator[str]:
-    """One sentence if the same cases come out differently a second time, or among other cases."""
-    why = "a case must depend on its inputs and case_id alone: no global state, clock or numpy.random"
-    again = _first_difference(flown, _results(campaign, inputs, ids))
-    if again is not None:
-        yield f'case {ids[again[0]]} has another "{again[1]}" when the same cases fly a second time; {why}'
-        return
-    parts = [np.arange(ids.size)[_CUT:][::-1], np.arange(ids.size)[:_CUT]]
-    for part in parts:
-        if part.size:
-            own = {name: value[part] if np.ndim(value) else value for name, value in inputs.items()}
-            among_all = {name: values[part] for name, values in flown.items()}
-            alone = _first_difference(among_all, _results(campaign, own, ids[part]))
-            if alone is not None:
-                yield (
-                    f'case {ids[part[alone[0]]]} has another "{alone[1]}" when it flies among other cases; {why}, '
-                    "and `prepare` must treat each case by itself"
-                )
-                return
-
-
-def _first_difference(a: Columns, b: Columns) -> tuple[int, str] | None:
-    """Place and column of the first number with other bits, None if there is none."""
-    for name, values in a.items():
-        same = values == b[name]
-        if values.dtype != object:
-            same |= np.isnan(values) & np.isnan(b[name])
-        if not same.all():
-            return int(np.flatnonzero(~same)[0]), name
-    return None
 
 
 def _never_set(campaign: Campaign, flown: Columns) -> Iterator[str]:
@@ -244,10 +255,10 @@ def _moves(campaign: Campaign, dispersion: Dispersion, others: Mapping[str, Any]
     places = _trial_values(campaign, dispersion)
     if np.unique(places).size == 1:
         return True
-    flown = _results(campaign, {**others, dispersion.name: places}, np.zeros(len(places), dtype=np.int64))
+    flown = results(campaign, {**others, dispersion.name: places}, np.zeros(len(places), dtype=np.int64))
     names = ["status", *(metric.name for metric in compiled_model(campaign.model).metrics)]
     rows = [{name: flown[name][[i]] for name in names} for i in range(len(places))]
-    return any(_first_difference(rows[0], row) is not None for row in rows[1:])
+    return any(first_difference(rows[0], row) is not None for row in rows[1:])
 
 
 def _trial_values(campaign: Campaign, dispersion: Dispersion) -> np.ndarray:

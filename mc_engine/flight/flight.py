@@ -334,7 +334,7 @@ class _Recorder:
             n_steps = grid_of(clock, settings_of(self._model, self._ready.settings[chosen[0]]))[0]
             pace *= -(-2 * n_steps // self._most)  # in steps
             room = min(2 * n_steps + 1, self._most)
-        out, counts = self._fly(chosen, pace, room)
+        out, counts = self._fly_once(chosen, pace, room)
         if isinstance(clock, AdaptiveStep):
             finer = np.maximum(1.0, -(-_OVERSAMPLED * self._rows // counts))
             wanted = np.where(counts > self._most, self._most / counts, finer)
@@ -342,16 +342,16 @@ class _Recorder:
                 pace[: chosen.size] = wanted
                 if chosen.size > self._together(counts * wanted):
                     return out, counts * wanted
-                out, counts = self._fly(chosen, pace, (counts * wanted).max())
+                out, counts = self._fly_once(chosen, pace, (counts * wanted).max())
         if counts.max() > self._history.shape[1] and chosen.size <= self._together(counts):
-            out, counts = self._fly(chosen, pace, counts.max())
+            out, counts = self._fly_once(chosen, pace, counts.max())
         return out, counts
 
     def _together(self, counts: np.ndarray) -> int:
         """How many cases with so many rows there is memory for; always for one."""
         return max(1, int(_MOST_NUMBERS // (self._n_fields * counts.max())))
 
-    def _fly(self, chosen: np.ndarray, pace: np.ndarray, room: float) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+    def _fly_once(self, chosen: np.ndarray, pace: np.ndarray, room: float) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
         """(results, number of rows of each case).  room : wanted for rows of each; one case gets it in any case."""
         n_lines = chosen.size * self._n_fields
         if chosen.size > 1:

@@ -207,15 +207,15 @@ def _write_source(path: Path, text: bytes) -> None:
 # ---- what a kernel takes beside the cases
 
 
-def _clock_number(item: float | str | Callable[[Any], float], settings: Any) -> float:
+def clock_number(item: float | str | Callable[[Any], float], settings: Any) -> float:
     if callable(item):
         return float(item(settings))
     return float(getattr(settings, item) if isinstance(item, str) else item)
 
 
 def grid_of(clock: FixedStep, settings: Any) -> tuple[int, float, int]:
-    """(n_steps, step [s], control_every) of one flight; the last step is the one that reaches `until`."""
-    step, until, every = (_clock_number(item, settings) for item in (clock.step, clock.until, clock.control_every))
+    """(n_steps, step [s], control_every) of one flight; the last step reaches `until`, or goes past it."""
+    step, until, every = (clock_number(item, settings) for item in (clock.step, clock.until, clock.control_every))
     if not (step > 0.0 and 0.0 < until <= _MOST_STEPS * step and every >= 1.0):
         raise ModelError(f"the clock has steps of {step:g} s until {until:g} s, control every {every:g} steps; all "
                          f"must be above 0, with no more than {_MOST_STEPS:,} steps")  # fmt: skip
@@ -240,7 +240,7 @@ def fixed_arguments(clock: FixedStep, settings: Any) -> tuple[Any, ...]:
 def adaptive_arguments(model: Model, clock: AdaptiveStep, settings: Any) -> tuple[np.ndarray, ...]:
     """Tables of the pair, clock and absolute tolerances, as the adaptive kernels take them."""
     pair = PAIRS[clock.method]
-    numbers = [_clock_number(item, settings) for item in (clock.until, clock.rtol, clock.control_period)]
+    numbers = [clock_number(item, settings) for item in (clock.until, clock.rtol, clock.control_period)]
     if not all(number > 0.0 for number in numbers):
         raise ModelError("the clock has until = {:g} s, rtol = {:g}, control_period = {:g} s; all must be above 0"
                          .format(*numbers))  # fmt: skip

@@ -130,7 +130,7 @@ class _Walk:
     def _function(self, function: FunctionType) -> Any:
         code, known = function.__code__, {**vars(builtins), **function.__globals__}
         self.names |= set(_names_in(code))
-        globals_read = sorted({name for name in _globals_of(code) if name in known})
+        globals_read = sorted(name for name in _globals_of(code) if name in known)
         values = [(name, self.value(known[name])) for name in globals_read]
         try:
             closure = [self.value(cell.cell_contents) for cell in function.__closure__ or ()]
@@ -183,11 +183,10 @@ def _names_in(code: CodeType) -> Iterator[str]:
         yield from (constant for constant in inner.co_consts if isinstance(constant, str))
 
 
-def _globals_of(code: CodeType) -> Iterator[str]:
-    for inner in _codes_in(code):
-        for step in dis.get_instructions(inner):
-            if step.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
-                yield step.argval
+@cache  # several walks read the same functions
+def _globals_of(code: CodeType) -> frozenset[str]:
+    steps = (step for inner in _codes_in(code) for step in dis.get_instructions(inner))
+    return frozenset(step.argval for step in steps if step.opname in ("LOAD_GLOBAL", "LOAD_NAME"))
 
 
 def _name_of(value: Any) -> str | None:
@@ -213,11 +212,13 @@ def _name_of(value: Any) -> str | None:
 
 @cache
 def _engine_digest() -> str:
-    """SHA-256 of the engine's compiled sources without comments and docstrings: of the lanes, and the status codes."""
+    """SHA-256 of the engine's compiled sources without comments: of the lanes, and the status codes.
+
+    They are read as Python keeps them compiled, which is what runs; to parse them takes five times as long.
+    """
     engine, walk, digest = Path(__file__).parents[1], _Walk(frozenset()), sha256()
     for path in (*sorted(engine.glob("lanes/*.py")), engine / "status.py"):
-        loader: Any = SourceFileLoader(path.stem, path.name)
-        code = loader.source_to_code(path.read_bytes(), path.name, _optimize=2)
+        code: Any = SourceFileLoader(path.stem, str(path)).get_code(path.stem)
         digest.update(repr((path.name, walk.code(code))).encode())
     return digest.hexdigest()
 

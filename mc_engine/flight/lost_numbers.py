@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mc_engine.campaign.loading import Campaign
 from mc_engine.flight.flight import fly_interpreted
+from mc_engine.flight.flyer import NOMINAL_NOISE
 from mc_engine.lanes.number import Origin
 from mc_engine.model.faults import origin_sentence, place_in_model
-from mc_engine.model.record import Model
+from mc_engine.model.record import Model, compiled_model
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
 
 if TYPE_CHECKING:
@@ -47,6 +49,26 @@ def first_lost(
     if origin is None:
         return ""
     return f'"{metric}": {origin_sentence(origin, who)}' if metric else origin_sentence(origin, who)
+
+
+def not_finite(
+    campaign: Campaign,
+    inputs: Mapping[str, Any],
+    ids: np.ndarray,
+    flown: Mapping[str, np.ndarray],
+    nominal: Mapping[str, np.ndarray],
+) -> list[str]:
+    """One sentence with the line of the model if a flight ended not-finite: the nominal one, or the first of these."""
+    word = STATUS_NAME[NOT_FINITE]
+    bad = np.flatnonzero(flown["status"] == word)
+    own: tuple[Mapping[str, Any], int, str] = campaign.nominal, NOMINAL_NOISE, "the nominal case"
+    if nominal["status"][0] != word:
+        if not bad.size:
+            return []
+        row = {name: value[bad[0]] if np.ndim(value) else value for name, value in inputs.items()}
+        own = row, int(ids[bad[0]]), f"case {ids[bad[0]]}"
+    sentence = first_lost(compiled_model(campaign.model), own[0], own[1], campaign.seed, own[2])
+    return [f"{sentence}; {bad.size} of the first {ids.size} cases end {word}"] if sentence else []
 
 
 def origin_of(flight: "InterpretedFlight", status: int) -> tuple[Origin | None, str]:

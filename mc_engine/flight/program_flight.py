@@ -171,7 +171,7 @@ class ProgramFlight:
     def _results(self, folder: Path, stdout: bytes, inputs: Mapping[str, Any], history: bool) -> Flown:
         """Metrics and history that a program wrote; ValueError with a sentence where they are not there."""
         document = None if self._program.result is None else _document(folder, self._program.result)
-        if self._program.echo is not None and (difference := _difference(document, self._program.echo, inputs)):
+        if self._program.echo is not None and (difference := _input_difference(document, self._program.echo, inputs)):
             return flown(NO_RESULT, difference)
         text, values = stdout.decode(errors="replace"), {}
         for metric in self._simulator.metrics:
@@ -346,7 +346,7 @@ def _number(name: str, document: Any, path: str | None, pattern: str | None, std
         raise ValueError(f'"{name}" is {clean(str(value)[:60])}, which is no number') from None
 
 
-def _difference(document: Any, path: str, inputs: Mapping[str, Any]) -> str:
+def _input_difference(document: Any, path: str, inputs: Mapping[str, Any]) -> str:
     """How the inputs that a program used differ from those of its case, as a sentence; empty if they do not."""
     try:
         used = _at(document, path)

@@ -1,4 +1,4 @@
-"""The nominal inputs as physics receives them, and whether they are the same in every process.
+"""The nominal inputs as physics receives them, and whether inputs and results repeat: in every process and batch.
 
 `check` computes the same digests in two processes, at two times, with different hash seeds and time zones.  Values that
 differ depend on the clock, randomness or the environment.
@@ -7,7 +7,7 @@ differ depend on the clock, randomness or the environment.
 import inspect
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from hashlib import blake2b
 from pathlib import Path
 from types import FrameType
@@ -17,16 +17,19 @@ import numpy as np
 
 from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import EngineError
-from mc_engine.flight.flight import grid_of, prepare, settings_of
+from mc_engine.flight.flight import fly, grid_of, prepare, settings_of
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model.faults import fault_of
-from mc_engine.model.fields import FixedStep
+from mc_engine.model.fields import AdaptiveStep, FixedStep
 from mc_engine.model.imports import PACKAGES, USER
 from mc_engine.model.record import compiled_model
 from mc_engine.model.trial import FEW, Breach
 
 _WHY = "a case must depend on its inputs and case_id alone: no clock, random numbers, hashes or environment"
+_CUT = 5  # cases of the smaller part when they are flown in two
 _read: dict[str, str] = {}  # by environment variable: where the model reads it
+
+Columns = Mapping[str, np.ndarray]
 
 
 def model_digests(campaign: Campaign) -> dict[str, str]:
@@ -114,3 +117,42 @@ def nominal_inputs(campaign: Campaign) -> tuple[Any, Any]:
     if isinstance(model.clock, FixedStep):
         grid_of(model.clock, settings)
     return model.kernel_parameters(*ready.parameters), settings
+
+
+def results(
+    campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, clock: FixedStep | AdaptiveStep | None = None
+) -> dict[str, np.ndarray]:
+    """Results of some cases of a campaign.  clock : see `mc_engine.flight.flight.fly`."""
+    return fly(compiled_model(campaign.model), inputs, ids, campaign.seed, folder=campaign.directory, clock=clock)
+
+
+def other_bits(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, flown: Columns) -> Iterator[str]:
+    """One sentence if the same cases come out differently a second time, or among other cases."""
+    why = "a case must depend on its inputs and case_id alone: no global state, clock or numpy.random"
+    again = first_difference(flown, results(campaign, inputs, ids))
+    if again is not None:
+        yield f'case {ids[again[0]]} has another "{again[1]}" when the same cases fly a second time; {why}'
+        return
+    parts = [np.arange(ids.size)[_CUT:][::-1], np.arange(ids.size)[:_CUT]]
+    for part in parts:
+        if part.size:
+            own = {name: value[part] if np.ndim(value) else value for name, value in inputs.items()}
+            among_all = {name: values[part] for name, values in flown.items()}
+            alone = first_difference(among_all, results(campaign, own, ids[part]))
+            if alone is not None:
+                yield (
+                    f'case {ids[part[alone[0]]]} has another "{alone[1]}" when it flies among other cases; {why}, '
+                    "and `prepare` must treat each case by itself"
+                )
+                return
+
+
+def first_difference(a: Columns, b: Columns) -> tuple[int, str] | None:
+    """Place and column of the first number with other bits, None if there is none."""
+    for name, values in a.items():
+        same = values == b[name]
+        if values.dtype != object:
+            same |= np.isnan(values) & np.isnan(b[name])
+        if not same.all():
+            return int(np.flatnonzero(~same)[0]), name
+    return None

@@ -214,7 +214,7 @@ class _Flight:
                 for reply in process.replies(self._order(left), len(left), self._limit_s, self._stopped):
                     self._take(left.pop(0), reply)
             except CaseEnded as end:
-                self._lost(left.pop(0), end, process)
+                self._record_ended(left.pop(0), end, process)
             except BaseException:
                 process.end()
                 raise
@@ -231,7 +231,7 @@ class _Flight:
             reply = next(process.replies(self._order(places), 1, limit, self._stopped))
         except CaseEnded as end:
             if len(places) == 1:
-                self._lost(places[0], end, process)
+                self._record_ended(places[0], end, process)
                 return
             process.end()
             reply = None
@@ -269,7 +269,7 @@ class _Flight:
         if self._on_history is not None:
             self._on_history(reply.history)
 
-    def _lost(self, place: int, end: CaseEnded, process: CaseProcess) -> None:
+    def _record_ended(self, place: int, end: CaseEnded, process: CaseProcess) -> None:
         """Record a case that ended its process, and keep what it left behind."""
         if self._stopped() or not threading.main_thread().is_alive():  # ended with the engine, not by the case
             process.end()

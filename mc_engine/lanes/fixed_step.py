@@ -160,7 +160,7 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
             f, method, past, has_events, t2, finish, h, s, m, p, o, flying, history, rows
         )
         moved = flying & (not broken)
-        if any_lane(not moved):  # a branch, foretold by the processor: the next step need not wait for the check
+        if any_lane(not moved):  # a branch, which the processor predicts: the next step need not wait for the check
             end, memory, now = select(moved, end, s), select(moved, memory, m), where(moved, now, t)
         s, m, t = end, memory, now
         status = where(overrun, _OVERRUN, where(broken, _BROKEN, status))

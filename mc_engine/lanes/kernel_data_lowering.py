@@ -151,13 +151,13 @@ def _register(function: Any, count: int) -> None:
 
 def _rows(builder, base, places, width, count):
     """`count` numbers from each lane's place on, each as a vector of lanes."""
-    rows = [_row(builder, base, places, lane if width > 1 else None, count) for lane in range(width)]
+    rows = [_load_row(builder, base, places, lane if width > 1 else None, count) for lane in range(width)]
     if width == 1:
         return [builder.extract_element(rows[0], ir.Constant(I32, i)) for i in range(count)]
     return _columns(builder, rows, count)
 
 
-def _row(builder, base, places, lane, count):
+def _load_row(builder, base, places, lane, count):
     """The numbers at one lane's place as a vector."""
     place = places if lane is None else builder.extract_element(places, ir.Constant(I32, lane))
     address = builder.gep(base, [place])

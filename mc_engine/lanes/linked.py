@@ -9,6 +9,7 @@ replaces internal steps of numba, in this file alone.
 from collections.abc import Iterable
 from typing import Any
 
+from llvmlite import binding
 from numba.core import errors
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -20,6 +21,8 @@ from numba.core.typed_passes import NativeLowering, NopythonRewrites
 from mc_engine.lanes.aligned_stack import align
 from mc_engine.lanes.call_frame import KernelCalls, PartCalls, calling_by, refuse_missing_blocks
 
+_MANY_BLOCKS = 400  # of one function; only the loop of a flight has as many
+
 
 class PartLibrary(JITCodeLibrary):
     """A function that can be linked, and cannot be run."""
@@ -27,12 +30,23 @@ class PartLibrary(JITCodeLibrary):
     _whole: Any = None
 
     def _optimize_functions(self, ll_module: Any) -> None:
-        """As numba's own, without the functions that are only declared, which are three of four."""
+        """As numba's own, without the functions that are only declared, which are three of four.
+
+        The time of some passes grows faster than the function: for a large one they are left to those of the kernel.
+        """
         ll_module.data_layout = self._codegen._data_layout
         for function in ll_module.functions:
             if not function.is_declaration:
-                passes, builder = self._codegen._function_pass_manager()
+                is_large = sum(1 for _ in function.blocks) > _MANY_BLOCKS
+                passes, builder = self._few_passes() if is_large else self._codegen._function_pass_manager()
                 passes.run(function, builder)
+
+    def _few_passes(self) -> tuple[Any, Any]:
+        passes = binding.create_new_function_pass_manager()
+        passes.add_instruction_combine_pass()
+        passes.add_sroa_pass()
+        passes.add_simplify_cfg_pass()
+        return passes, self._codegen._pass_builder()
 
     def finalize(self) -> None:
         """Called by numba when nothing is added any more."""

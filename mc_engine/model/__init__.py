@@ -2,6 +2,7 @@
 
 from mc_engine.model.declarations import (
     at_end,
+    choices,
     inputs,
     last_above,
     maximum_of,
@@ -47,6 +48,7 @@ __all__ = [
     "ScatterFigure",
     "Setting",
     "at_end",
+    "choices",
     "inputs",
     "kept_design",
     "last_above",

@@ -7,13 +7,12 @@ unit: Parameter(0.1, "eccentricity", unit="").
 
 from collections import namedtuple
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 from mc_engine.errors import ModelError
 from mc_engine.model.fields import OF_NAME, Extremum, Field, Named, Parameter, Setting
-from mc_engine.units import UNITS, nearest_unit, unit_hint, unit_suffix
-
-_LONGEST_ENDING = 5  # words of a unit at the end of a name, as in _n_m_s or _deg_sqrt_h
+from mc_engine.units import UNITS, unit_hint, unit_of
 
 
 @dataclass(frozen=True)
@@ -203,6 +202,25 @@ def inputs(**declared: Parameter | Setting) -> Any:
     return _record("Inputs", [item.symbol for item in named if isinstance(item, Parameter)], tuple(named))
 
 
+def choices(inputs: Any) -> SimpleNamespace:
+    """The numbers that physics has for the words of settings: CHOICES = choices(Inputs), o.law == CHOICES.law.a.
+
+    inputs : made by the function of this name
+
+    Returns the words of each setting with choices, by its name without unit.  One that is no name in Python is
+    getattr(CHOICES.law, "two-body"), kept under a name of its own outside of physics.
+
+    Raises AttributeError for what declares nothing.
+
+    >>> Inputs = inputs(law=Setting("a", "control law", choices=("a", "b")))
+    >>> choices(Inputs).law.b
+    1.0
+    """
+    settings = [item for item in inputs.declared if isinstance(item, Setting) and item.choices]
+    numbers = {item.symbol: {word: item.code(word) for word in item.choices} for item in settings}
+    return SimpleNamespace(**{symbol: SimpleNamespace(**words) for symbol, words in numbers.items()})
+
+
 def states(**declared: str | Field) -> Any:
     """The state of a model by its columns, each with its meaning: the named tuple that `initial` and `rhs` give.
 
@@ -294,39 +312,3 @@ def _with_unit(item: Any, name: str) -> Any:
         has_none = isinstance(item, Setting) and (item.choices or item.date or isinstance(item.default, bool))
         unit = "" if has_none else unit_of(name)
     return replace(item, name=name, unit=unit)
-
-
-def unit_of(name: str) -> str:
-    """The unit at the end of a column's name; ModelError where there is none, or where it may be two.
-
-    >>> unit_of("burn_dv_m_s"), unit_of("heat_load_mj_m2")
-    ('m/s', 'MJ/m^2')
-    """
-    known = units_at_the_end(name)
-    longest = max((unit_suffix(unit) for unit in known), key=len, default="")
-    units = [unit for unit in known if unit_suffix(unit) == longest]
-    if longest.startswith("_1_"):  # stage_1_s is a time of stage 1, or a rate
-        units += [unit for unit in known if unit_suffix(unit) == longest[2:]]
-    if len(units) == 1:
-        return units[0]
-    if units:
-        raise ModelError(f'"{name}" may end in the unit {" or ".join(units)}; say which, unit="{units[0]}"')
-    meant = _meant(name)
-    ending = f'; did you mean "{meant}"?' if meant else ""
-    raise ModelError(f'"{name}" ends in no unit{ending}; say unit="" for a plain number; `mc-engine units` lists all')
-
-
-def units_at_the_end(name: str) -> list[str]:
-    """Every unit that a column's name may end in."""
-    return [unit for unit in UNITS if unit and name.endswith(unit_suffix(unit)) and name != unit_suffix(unit)]
-
-
-def _meant(name: str) -> str:
-    """The name with the unit that its last words are nearly; "" where they are like none."""
-    words = name.split("_")
-    for count in range(1, min(_LONGEST_ENDING, len(words) - 1) + 1):
-        ending = "_".join(words[-count:]) or "_"
-        alike = [unit for unit in UNITS if unit == "%" or unit[:1].lower() == ending[0].lower()]
-        if near := nearest_unit(ending, alike):
-            return "_".join(words[:-count]) + unit_suffix(near)
-    return ""

@@ -1,8 +1,8 @@
 """`model`: makes the record that the engine reads from what a model file declares.
 
 A function of a model takes the arguments that it names, in any order; the engine calls them all alike, so each becomes
-a `ComposedFunction` that hands on what was asked for.  Events and metrics that have functions of their own, or none,
-are composed in the same way.
+a `ComposedFunction` that hands on the arguments that it names.  Events and metrics that have functions of their own, or
+none, are composed in the same way.
 """
 
 import inspect

@@ -109,7 +109,7 @@ class Setting(Named):
 
     default : str, bool or float, the nominal value
     description : str, one line
-    choices : tuple of str, the words; physics sees the index of the one chosen
+    choices : tuple of str, the words; physics sees a number, see `choices`
     low : float, smallest number that is accepted, in `unit`; of a date, as modified Julian date
     high : float, largest number that is accepted
     whole : bool, only whole numbers are accepted, as for a count
@@ -212,13 +212,15 @@ class FixedStep:
     """An integrator on a time grid that all cases share: the classical Runge-Kutta method, or a multistep method.
 
     step : float, length of a step [s], or str, the symbol of a setting that holds it
-    until : float or str, end of the flight [s]; at most 1e9 steps.  In a model with a stopping event, see `Event`.
+    until : float or str, end of the flight [s], at most 1e9 steps; inside a step, the flight ends with that step, which
+        `mc-engine check` reports.  In a model with a stopping event, see `Event`.
     control_every : int or str, steps from one call of `control` to the next
     method : str, "rk4" (order 4), or for long smooth arcs "abm8" to "abm12", Adams-Bashforth-Moulton of order 8 to 12,
         or "gj6" to "gj10", Gauss-Jackson with differences of order 6 to 10, where every state is the rate of another or
         has one.  ABM is stable for steps below 0.37, 0.26, 0.18, 0.12, 0.08 over the fastest angular frequency [rad/s],
         GJ for 0.33, 0.24, 0.17, 0.12, 0.09, and with weak damping only, see `mc_engine.lanes.gauss_jackson`.  Both
         start by DOP853, and again after each event and each sample of the control that changes the discrete state.
+        `mc-engine check` flies the nominal case with half of the step, too, and reports steps that are far too long.
     rates : tuple of pairs (state, its rate) by their names without units, for GJ: the derivative of the first state of
         a pair is the second
 

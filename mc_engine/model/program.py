@@ -19,14 +19,13 @@ from typing import Any, Literal, NamedTuple
 from pydantic import Field as Key
 
 from mc_engine.errors import ModelError
-from mc_engine.model.declarations import units_at_the_end
 from mc_engine.model.fields import Field, Parameter
 from mc_engine.model.files import FileFault, resolve_beside
 from mc_engine.model.simulator import LARGEST_MIB, LONGEST_S, Simulator
 from mc_engine.model.sources import Sources
 from mc_engine.section import Section
 from mc_engine.suggestions import hint
-from mc_engine.units import unit_suffix
+from mc_engine.units import unit_suffix, units_at_the_end
 
 PLACES = ("folder", "case_id", "seed")  # that a command may name in braces
 JSON_INPUT = "json"

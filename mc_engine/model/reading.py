@@ -281,9 +281,10 @@ def _steps(loop: ast.While) -> bool:
 def _wrong_comparison(node: ast.Compare, scope: _Scope) -> str:
     """On a setting compared with a text, for which kernels have a number, and on `is`, which holds in no case."""
     sides = [node.left, *node.comparators]
-    chosen = any(isinstance(side, ast.Attribute) and side.attr in scope.settings for side in sides)
+    chosen = [side.attr for side in sides if isinstance(side, ast.Attribute) and side.attr in scope.settings]
     if chosen and any(map(scope.is_text, sides)) and not scope.is_constant(node):
-        return "in physics a setting is a number, not a text: the index in its `choices`, such as 0.0 for the first"
+        word = f"CHOICES.{chosen[0]}.word"
+        return f"in physics a setting is a number, not a text; CHOICES = choices(Inputs) has it as {word}"
     if not any(isinstance(sign, ast.Is | ast.IsNot) for sign in node.ops) or all(map(scope.is_constant, sides)):
         return ""
     if any(isinstance(side, ast.Constant) and side.value is None for side in sides):

@@ -10,7 +10,7 @@ import numpy as np
 
 from mc_engine.errors import ModelError
 from mc_engine.suggestions import hint, listed
-from mc_engine.units import UNITS, unit_hint
+from mc_engine.units import UNITS, unit_hint, unit_of, units_meant
 
 LARGEST = 1e300  # of the arguments
 
@@ -19,28 +19,33 @@ def columns_of(path: Path, wanted: Mapping[str, str | None]) -> dict[str, np.nda
     """float64[n_rows], SI, of each wanted column.
 
     wanted : names of columns, each with its unit, or with None: then the end of its name says it, such as _km_s, and a
-        name without a unit is a plain number.
+        single word, such as mach, is a plain number.
     Raises ModelError where the file, a column, a unit or a number is missing; FileNotFoundError as `open` does.
     """
     columns = _parquet(path) if path.suffix == ".parquet" else _csv(path)
     for name in wanted:
         if name not in columns:
             raise ModelError(f'{path.name} has no column "{name}"{hint(name, columns)}; it has {listed([*columns])}')
-    return {name: columns[name] * si_factor(name, unit) for name, unit in wanted.items()}
+    try:
+        return {name: columns[name] * si_factor(name, unit) for name, unit in wanted.items()}
+    except ModelError as error:
+        raise ModelError(f"{path.name}: {error}") from None
 
 
 def si_factor(name: str, unit: str | None = None) -> float:
-    """SI value of one unit of a column.  unit : by default what the name ends in; the longest ending counts."""
+    """SI value of one unit of a column.
+
+    unit : by default what the name ends in; the longest ending counts.  A single word, such as mach, has none.
+    Raises ModelError where `unit` is none, and where a name of several words ends in none or in what may be two.
+    """
     if unit is not None:
         if unit not in UNITS:
             raise ModelError(f'"{unit}" is not a unit{unit_hint(unit)}')
         return UNITS[unit].factor
-    fitting = [known for known in UNITS.values() if known.suffix and name.endswith(known.suffix)]
-    longest = max((len(known.suffix) for known in fitting), default=0)
-    factors = {known.factor for known in fitting if len(known.suffix) == longest}
-    if len(factors) > 1:
-        raise ModelError(f'the end of "{name}" could be more than one unit; say which')
-    return factors.pop() if factors else 1.0
+    if name.isalnum():  # mach, cd
+        return 1.0
+    factors = {UNITS[meant].factor for meant in units_meant(name)}
+    return factors.pop() if len(factors) == 1 else UNITS[unit_of(name)].factor
 
 
 def _csv(path: Path) -> dict[str, np.ndarray]:

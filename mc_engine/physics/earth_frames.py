@@ -157,7 +157,7 @@ def ned_from_ecef(latitude, longitude):
     """Matrix from ECEF to NED at a geodetic latitude and longitude [rad]."""
     s, c = sincos(latitude)
     sl, cl = sincos(longitude)
-    return Matrix(-s * cl, -s * sl, c, -sl, cl, 0.0 * c, -c * cl, -c * sl, -s)
+    return Matrix(-s * cl, -s * sl, c, -sl, cl, 0.0, -c * cl, -c * sl, -s)
 
 
 @physics
@@ -222,7 +222,7 @@ def wind_from_body(alpha, beta):
     """Matrix from body to wind axes: drag is along -x, side force along y, lift along -z of the latter."""
     sa, ca = sincos(alpha)
     sb, cb = sincos(beta)
-    return Matrix(ca * cb, sb, sa * cb, -ca * sb, cb, -sa * sb, -sa, 0.0 * ca, ca)
+    return Matrix(ca * cb, sb, sa * cb, -ca * sb, cb, -sa * sb, -sa, 0.0, ca)
 
 
 # ---- orbital frames
@@ -245,7 +245,7 @@ def lvlh_from_eci(r_eci, v_eci):
 def ric_rate(r_eci, v_eci):
     """Angular rate [rad/s] of RIC relative to ECI in RIC axes, for a motion without force across the orbit: h / r^2."""
     h = cross(r_eci, v_eci)
-    return Vector(0.0 * h.x, 0.0 * h.x, sqrt(dot(h, h)) / dot(r_eci, r_eci))
+    return Vector(0.0, 0.0, sqrt(dot(h, h)) / dot(r_eci, r_eci))
 
 
 @physics
@@ -271,4 +271,4 @@ def ric_to_eci(r_eci, v_eci, relative):
 def acceleration_in_ecef(r_ecef, v_ecef, rate=EARTH_RATE):
     """What the turning of the Earth adds to the acceleration relative to it: -2 rate x v - rate x (rate x r)."""
     across = scaled(rate * rate, r_ecef)
-    return Vector(2.0 * rate * v_ecef.y + across.x, across.y - 2.0 * rate * v_ecef.x, 0.0 * v_ecef.z)
+    return Vector(2.0 * rate * v_ecef.y + across.x, across.y - 2.0 * rate * v_ecef.x, 0.0)

@@ -78,7 +78,7 @@ def harmonics_table(degree: int, order: int) -> np.ndarray:
     for n, m, normal_c, normal_s in EGM2008:
         if n <= degree and m <= order:
             c[n, m], s[n, m] = unnormalised(n, m) * normal_c, unnormalised(n, m) * normal_s
-    return np.array([_row(c, s, i, j) for j in range(order + 2) for i in range(j, degree + 2)])
+    return np.array([_harmonics_row(c, s, i, j) for j in range(order + 2) for i in range(j, degree + 2)])
 
 
 def harmonics_rows(degree: np.ndarray, order: np.ndarray) -> np.ndarray:
@@ -86,7 +86,7 @@ def harmonics_rows(degree: np.ndarray, order: np.ndarray) -> np.ndarray:
     return (order + 2) * (degree + 2) - (order + 1) * (order + 2) / 2
 
 
-def _row(c: np.ndarray, s: np.ndarray, i: int, j: int) -> list[float]:
+def _harmonics_row(c: np.ndarray, s: np.ndarray, i: int, j: int) -> list[float]:
     """Montenbruck, Gill, Satellite Orbits, eqs (3.30) and (3.33), collected by V and W of degree i and order j."""
     n = i - 1
     above = below = (0.0, 0.0)  # coefficients one order above and below, with their weights
@@ -118,11 +118,11 @@ def harmonics(x, y, z, mu, radius, degree, order, tables, first):
     inverse2 = 1.0 / r2
     sx, sy, sz = x * radius * inverse2, y * radius * inverse2, z * radius * inverse2
     s2 = radius * radius * inverse2
-    ax, ay, az = 0.0 * x, 0.0 * x, 0.0 * x
-    v_sector, w_sector = radius * sqrt(r2) * inverse2, 0.0 * x
+    ax = ay = az = 0.0
+    v_sector, w_sector = radius * sqrt(r2) * inverse2, 0.0
     at, last = int(first), int(degree) + 2  # integers: the processor reckons with them beside the lanes
     for j in range(int(order) + 2):
-        v, w, v_before, w_before = v_sector, w_sector, 0.0 * x, 0.0 * x
+        v, w, v_before, w_before = v_sector, w_sector, 0.0, 0.0
         for _ in range(j, last):
             ax = ax + (look_up(tables, at) * v + look_up(tables, at + 1) * w)
             ay = ay + (look_up(tables, at + 2) * v + look_up(tables, at + 3) * w)

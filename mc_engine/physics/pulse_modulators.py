@@ -53,8 +53,7 @@ def _headed(pulses, left, rest, fired, command, m):
 @physics
 def _begun(pulses, command, m, period):
     """The sample before its first switch."""
-    zero = 0.0 * command
-    return _headed(pulses, zero + period, zero + m.decay, zero, command, m)
+    return _headed(pulses, period, m.decay, 0.0, command, m)
 
 
 @physics

@@ -138,7 +138,7 @@ def to_rotation_vector(b_from_a):
 @physics
 def from_small_angles(angles):
     """b_from_a of small angles [rad] about the three axes, of unit length: the error is the cube of the angle / 12."""
-    return normalized(Quaternion(angles.x * 0.0 + 1.0, 0.5 * angles.x, 0.5 * angles.y, 0.5 * angles.z))
+    return normalized(Quaternion(1.0, 0.5 * angles.x, 0.5 * angles.y, 0.5 * angles.z))
 
 
 @physics
@@ -210,12 +210,11 @@ def euler_sequence(axes):
 def _about(axis, angle):
     """Quaternion of a turn about one axis, 1, 2 or 3."""
     s, c = sincos(0.5 * angle)
-    zero = 0.0 * c
     if axis == 1:
-        return Quaternion(c, s, zero, zero)
+        return Quaternion(c, s, 0.0, 0.0)
     if axis == 2:
-        return Quaternion(c, zero, s, zero)
-    return Quaternion(c, zero, zero, s)
+        return Quaternion(c, 0.0, s, 0.0)
+    return Quaternion(c, 0.0, 0.0, s)
 
 
 def _to_angles(first, second, third):

@@ -56,7 +56,7 @@ class Debugged:
 def fly_debugged(
     model: Model, inputs: dict[str, Any], noise: int, seed: int, stop: Stop | None, tell: Callable[[str], None]
 ) -> Debugged:
-    """Fly one case, stopping as asked; without a stop, only at the model's own `breakpoint()`.
+    """Fly one case, stopping where `stop` says; without a stop, only at the model's own `breakpoint()`.
 
     inputs : every parameter and setting, in declared units.  noise : see `mc_engine.flight.flyer.Flyer.fly`.
     tell : called with a line on the function and the time before it stops.
@@ -72,7 +72,7 @@ def fly_debugged(
     flight = _StoppingFlight(model, stop, tell)
     functions: list[tuple[PhysicsFunction, int]] = []
     if stop is not None and stop.not_finite:
-        flight.origin_call, places = _lost(model, inputs, noise, seed)
+        flight.origin_call, places = _breaking_call(model, inputs, noise, seed)
         functions = _stopped_at(model, places) if flight.origin_call >= 0 else []
     elif stop is not None:
         functions = [(physics, 0) for physics in _written(model, flight.functions)]
@@ -159,7 +159,7 @@ def _flattened(value: Any) -> Iterator[Any]:
         yield value
 
 
-def _lost(model: Model, inputs: dict[str, Any], noise: int, seed: int) -> tuple[int, tuple[Place, ...]]:
+def _breaking_call(model: Model, inputs: dict[str, Any], noise: int, seed: int) -> tuple[int, tuple[Place, ...]]:
     """(index of the call that made the number which broke the flight, its places); (-1, ()) where none did."""
     flight, hook = _NotingFlight(model), sys.breakpointhook
     try:

@@ -47,15 +47,15 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
     """
     if not campaign.model.quantities:  # of a simulator without outputs
         return True
-    retained = retained_cases(store, campaign)
-    if _are_kept(store, campaign, retained):
+    saved = cases_to_save(store, campaign)
+    if _are_kept(store, campaign, saved):
         return True
     flyer = flyer_of(campaign)
     workers = min(workers, flyer.most_workers or workers)
     together = flyer.histories_together
-    size = together * max(1, -(-len(retained) // (CHUNKS_PER_WORKER * workers * together)))
+    size = together * max(1, -(-len(saved) // (CHUNKS_PER_WORKER * workers * together)))
     pieces = [[-1]] if campaign.retention.nominal else []
-    pieces += [retained[first : first + size] for first in range(0, len(retained), size)]
+    pieces += [saved[first : first + size] for first in range(0, len(saved), size)]
     flown = in_threads(lambda piece: _histories_of(campaign, flyer, piece, stopped), pieces, workers)
     histories = [columns for piece in flown for columns in piece]
     if len(histories) < sum(map(len, pieces)):
@@ -76,19 +76,19 @@ def _histories_of(campaign: Campaign, flyer: Flyer, cases: Sequence[int], stoppe
     return [_with_case(case, next(flights)[1]) for case in wanted]
 
 
-def _are_kept(store: Store, campaign: Campaign, retained: list[int]) -> bool:
+def _are_kept(store: Store, campaign: Campaign, saved: list[int]) -> bool:
     """Whether undamaged histories of these cases are stored; a refused case, which has never started, has none."""
     part = store.history_part
     if part is None or problem_of(store.path / part.file, store.histories):
         return False
     refused = STATUS_NAME[REFUSED]
-    expected = {*retained} - _cases_that_ended(store, (refused,))
+    expected = {*saved} - _cases_that_ended(store, (refused,))
     if campaign.retention.nominal and store.nominal()["status"] != refused:
         expected.add(-1)
     return set(store.histories().get("case_id", [])) == expected
 
 
-def retained_cases(store: Store, campaign: Campaign) -> list[int]:
+def cases_to_save(store: Store, campaign: Campaign) -> list[int]:
     """The cases whose history is saved: the first ones, those listed, and the worst completed ones; each once."""
     retention = campaign.retention
     chosen = [*range(min(retention.first, store.n_cases)), *(case for case in retention.cases if case < store.n_cases)]

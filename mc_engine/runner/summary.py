@@ -119,15 +119,19 @@ def analyses_line(store: Store) -> str:
 
 def verdict_line(verdict: "Verdict", units: Mapping[str, str]) -> str:
     """Such as "fuel: pass, mass_kg ≤ 2.5 kg in 9,998 of 10,000 cases (required: 99.73 % with 90 % confidence)"."""
-    limits = [
-        f"{sign} {limit:,.12g} {units.get(verdict.metric, '')}".rstrip()
-        for sign, limit in (("≤", verdict.at_most), ("≥", verdict.at_least))
-        if limit is not None
-    ]
     required = f"required: {100 * verdict.share:.6g} % with {100 * verdict.confidence:.6g} % confidence"
     inside = f"in {verdict.passed:,} of {verdict.tried:,} cases"
-    asked = f"{verdict.metric} {' and '.join(limits)}" if limits else "all limits met"
-    return f"{verdict.name}: {verdict.outcome}, {asked} {inside} ({required})"
+    asked = "all limits met"
+    if verdict.metric:
+        asked = f"{verdict.metric} {_limit_words(verdict)} {units.get(verdict.metric, '')}".rstrip()
+    because = f"; {verdict.failing_words}" if verdict.failing else ""
+    return f"{verdict.name}: {verdict.outcome}, {asked} {inside} ({required}){because}"
+
+
+def _limit_words(verdict: "Verdict") -> str:
+    if verdict.at_least is not None and verdict.at_most is not None:
+        return f"within {verdict.at_least:,.12g} to {verdict.at_most:,.12g}"
+    return f"≤ {verdict.at_most:,.12g}" if verdict.at_least is None else f"≥ {verdict.at_least:,.12g}"
 
 
 def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, Summary]":

@@ -15,7 +15,7 @@ import numpy as np
 
 from mc_engine.sampling.correlation import correlated, gaussian_copula, iman_conover
 from mc_engine.sampling.sobol import scrambled_sobol
-from mc_engine.sampling.streams import uniforms
+from mc_engine.sampling.streams import uniform_columns, uniforms
 from mc_engine.status import MOST_CASES
 
 RANDOM = ("mc", "lhs", "sobol")
@@ -41,13 +41,12 @@ def unit_cube(
     if design in IN_BLOCKS:
         block, row = np.divmod(np.asarray(case_ids, dtype=np.int64), block_size(design, len(names)))
         return _saltelli(seed, names, block, row) if design == "saltelli" else _morris(seed, names, block, row)
-    columns = [
-        uniforms(seed, name, case_ids)
-        if design == "mc"
-        else scrambled_sobol(sobol_key(f"{seed}/{name}/sobol"), dimension, case_ids)
-        for dimension, name in enumerate(names)
-    ]
-    return correlated(gaussian_copula, columns, names, pairs)
+    if design == "mc":
+        cube = uniform_columns(seed, names, case_ids)
+    else:
+        keys = [sobol_key(f"{seed}/{name}/sobol") for name in names]
+        cube = scrambled_sobol(keys, range(len(names)), case_ids)
+    return correlated(gaussian_copula, list(cube), names, pairs)
 
 
 def sobol_key(words: str) -> int:

@@ -4,6 +4,7 @@ A point is a function of (key, dimension, index): more points, or more dimension
 to 128 dimensions and 2**32 points; beyond, use the design "mc".
 """
 
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import numpy as np
 MAX_DIMENSIONS = 128  # of the table in sobol_numbers.txt
 
 _BITS = 32
-_BLOCK = 8192  # points worked on at a time, so that they stay in cache
+_BLOCK = 8192  # numbers worked on at a time, so that they stay in cache
 _GROUP = 4  # digits scrambled with one hash: their 15 inner nodes take one bit each
 _ONE = np.uint64(1)
 
@@ -44,30 +45,36 @@ def direction_numbers(dimension: int) -> tuple[int, ...]:
     return tuple(m[k] << (_BITS - 1 - k) for k in range(_BITS))
 
 
-def sobol_digits(dimension: int, indices: np.ndarray) -> np.ndarray:
-    """uint64[n]: the points of one dimension as 32-bit fractions, in Gray-code order, not scrambled."""
+def sobol_digits(dimension: int | Sequence[int], indices: np.ndarray) -> np.ndarray:
+    """uint64[n], or [n_dimensions, n]: points as 32-bit fractions, in Gray-code order, not scrambled."""
     gray = indices ^ (indices >> _ONE)
-    digits = np.zeros_like(gray)
-    for k, direction in enumerate(direction_numbers(dimension)):
-        digits ^= ((gray >> np.uint64(k)) & _ONE) * np.uint64(direction)
+    directions = np.array([direction_numbers(d) for d in np.ravel(dimension).tolist()], dtype=np.uint64)
+    directions = directions.reshape(*np.shape(dimension), _BITS, 1)
+    digits = np.zeros((*np.shape(dimension), indices.size), dtype=np.uint64)
+    for k in range(_BITS):
+        digits ^= ((gray >> np.uint64(k)) & _ONE) * directions[..., k, :]
     return digits
 
 
-def scrambled_sobol(key: int, dimension: int, indices: np.ndarray) -> np.ndarray:
+def scrambled_sobol(key: int | Sequence[int], dimension: int | Sequence[int], indices: np.ndarray) -> np.ndarray:
     """float64[n] in [0, 1): one dimension of the Sobol points `indices`, scrambled by `key`.
+
+    Of several dimensions, each with its key, float64[n_dimensions, n]: drawn together, since a chunk has few points.
 
     indices : int64[n], 0 <= index < 2**32.
     Nested uniform scrambling: Owen, Randomly permuted (t,m,s)-nets and (t,s)-sequences, 1995.
     """
     indices = np.asarray(indices).astype(np.uint64)
-    result = np.empty(indices.size)
-    for first in range(0, indices.size, _BLOCK):
-        digits = sobol_digits(dimension, indices[first : first + _BLOCK])
-        result[first : first + _BLOCK] = _scrambled(np.uint64(key), digits)
+    keys = np.array(key, dtype=np.uint64)[..., np.newaxis]
+    result = np.empty((*np.shape(dimension), indices.size))
+    size = _BLOCK // max(1, keys.size) + 1
+    for first in range(0, indices.size, size):
+        digits = sobol_digits(dimension, indices[first : first + size])
+        result[..., first : first + size] = _scrambled(keys, digits)
     return result
 
 
-def _scrambled(key: np.uint64, digits: np.ndarray) -> np.ndarray:
+def _scrambled(key: np.ndarray, digits: np.ndarray) -> np.ndarray:
     """Flip each digit by a coin that depends on all digits before it; fill 21 more digits below."""
     flips = np.zeros_like(digits)
     for level in range(0, _BITS, _GROUP):
@@ -82,7 +89,7 @@ def _scrambled(key: np.uint64, digits: np.ndarray) -> np.ndarray:
     return (((digits ^ flips) << np.uint64(21)) | below) * 2.0**-53
 
 
-def _hash(key: np.uint64, words: np.ndarray) -> np.ndarray:
+def _hash(key: np.ndarray, words: np.ndarray) -> np.ndarray:
     """64 random bits per word.  SplitMix64: Steele, Lea & Flood, OOPSLA 2014."""
     z = words * np.uint64(0x9E3779B97F4A7C15) + key
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

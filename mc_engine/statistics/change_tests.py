@@ -23,7 +23,7 @@ Brown & Forsythe, J. Am. Stat. Assoc. 69 (1974), 364-367; McNemar, Psychometrika
 
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
-from math import inf, isfinite, log, sqrt
+from math import floor, inf, isfinite, log, log10, sqrt
 
 import numpy as np
 from scipy.optimize import brentq
@@ -33,6 +33,7 @@ from mc_engine.statistics.moments import in_units, near_one
 
 FEWEST = 10  # numbers in each run, or pairs, for a test of a metric
 MOST_CASES = 200_000
+MOST_DECIMALS = 9  # of an estimate that is printed
 _ROUNDING = 1e-12  # of the largest number: spread below it is rounding
 
 
@@ -43,6 +44,13 @@ class Estimate:
     value: float
     lower: float
     upper: float
+
+    @property
+    def decimals(self) -> int:
+        """Decimals that show the width of the interval in two digits, or the value in three without a width."""
+        width = self.upper - self.lower
+        scale = 10.0 * width if isfinite(width) and width > 0.0 else abs(self.value)
+        return min(max(2 - floor(log10(scale)), 0), MOST_DECIMALS) if isfinite(scale) and scale > 0.0 else 0
 
 
 UNKNOWN = Estimate(np.nan, np.nan, np.nan)

@@ -69,6 +69,7 @@ class Verdict:
         cases was decided along the way, and then it is at most 1 - confidence
     producer_risk : float or None, probability of not passing a system that fails half as often as it may
     shared_outcome : str, the outcome at the confidence that makes all verdicts of a campaign hold together
+    failing : tuple of str, of a joint verdict the requirements that fail it where its own fraction does not
     random : bool, the cases are a random sample, so that a fraction of them estimates a probability
     looked : bool, the number of cases was decided by looking at them
 
@@ -100,6 +101,14 @@ class Verdict:
     shared_outcome: str
     random: bool
     looked: bool
+    failing: tuple[str, ...] = ()
+
+    @property
+    def failing_words(self) -> str:
+        """Such as "fuel fails with confidence shared"; empty without a requirement that fails the joint verdict."""
+        if not self.failing:
+            return ""
+        return f"{' and '.join(self.failing)} {'fails' if len(self.failing) == 1 else 'fail'} with confidence shared"
 
     @property
     def margin(self) -> float | None:
@@ -210,8 +219,9 @@ def judge_counted(
 
 def _joined(joint: Verdict, tests: Sequence[Verdict]) -> Verdict:
     """The verdict on the joint share with the outcome of all tests together."""
-    if any(test.shared_outcome == FAIL for test in tests):
-        return replace(joint, outcome=FAIL, needed=None)
+    failing = tuple(test.name for test in tests if test.shared_outcome == FAIL)
+    if failing:
+        return replace(joint, outcome=FAIL, needed=None, failing=() if joint.outcome == FAIL else failing)
     if all(test.outcome == PASS for test in tests):
         return replace(joint, outcome=PASS, needed=None)
     refuted = any(test.outcome == FAIL for test in tests)

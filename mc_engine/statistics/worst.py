@@ -22,16 +22,16 @@ class Limits(NamedTuple):
         return self.at_most is not None and self.at_least is not None
 
     @property
-    def width(self) -> float:
-        """The unit of margins: the distance between two limits, the size of a single one, 1 for a limit of 0."""
+    def reach(self) -> float:
+        """The unit of margins: half the distance between two limits, the size of a single one, 1 for a limit of 0."""
         ends = [end for end in self if end is not None]
-        return abs(ends[0] - ends[-1] if len(ends) > 1 else ends[0]) or 1.0 if ends else 1.0
+        return abs(0.5 * (ends[0] - ends[-1]) if len(ends) > 1 else ends[0]) or 1.0 if ends else 1.0
 
     def margins(self, values: np.ndarray) -> np.ndarray:
-        """float64[n]: distance inside the nearest limit over the width, negative outside; infinite without a limit."""
+        """float64[n]: distance inside the nearest limit over the reach, negative outside; infinite without a limit."""
         above = np.inf if self.at_most is None else self.at_most - values
         below = np.inf if self.at_least is None else values - self.at_least
-        return np.minimum(above, below) / self.width + 0.0 * values
+        return np.minimum(above, below) / self.reach + 0.0 * values
 
     def largest_is_worst(self, values: np.ndarray) -> bool:
         """Whether large values are the bad ones; with two limits, whether the value nearest to one is at the upper."""

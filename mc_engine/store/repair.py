@@ -22,11 +22,11 @@ def mend_journal(run: Path) -> None:
     if is_run_directory(run):
         for folder in PART_FOLDERS:
             make_way(run, f"{folder}/*")
-    if not (run / JOURNAL).is_file() or not _lost(scan(read_journal(run / JOURNAL))):
+    if not (run / JOURNAL).is_file() or not _damaged_lines(scan(read_journal(run / JOURNAL))):
         return
     with (lock := WriterLock(run)) as dead:
         journal = scan(read_journal(run / JOURNAL))  # again: another process may have written since
-        lost = _lost(journal)
+        lost = _damaged_lines(journal)
         if not lost:
             return
         events = [(entry.at, entry.event, entry.facts) for entry in journal.entries if entry.number not in lost]
@@ -37,7 +37,7 @@ def mend_journal(run: Path) -> None:
         write_inside(run, JOURNAL, b"".join(lines))
 
 
-def _lost(journal: Scan) -> list[int]:
+def _damaged_lines(journal: Scan) -> list[int]:
     """Numbers of the lines that are not valid; empty if line 1 is among them, since nothing can replace it."""
     lost = sorted({*journal.damaged, *receipts_of(journal.entries)[1]})
     return lost if lost and lost[0] > 1 else []

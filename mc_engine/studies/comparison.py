@@ -50,12 +50,14 @@ class VerdictChange:
     """A requirement's verdict in each run, by that run's own limits; None where a run has no such requirement.
 
     inside : by run, how many of its cases are inside the limits, of all.
+    failing_words : by run, of the joint verdict, which requirement fails it; see `Verdict`.
     """
 
     name: str
     before: str | None
     after: str | None
     inside: tuple[tuple[int, int] | None, tuple[int, int] | None] = (None, None)
+    failing_words: tuple[str, str] = ("", "")
 
     @property
     def words(self) -> str:
@@ -70,7 +72,8 @@ class VerdictChange:
             return ""
         (passed, tried), (now, of) = a, b
         before = counted(passed) if tried == of else f"{counted(passed)} of {counted(tried)}"
-        return f"{before} → {counted(now)} of {counted(of)} cases inside"
+        because = [f"; in {run} {words}" for run, words in zip("AB", self.failing_words, strict=True) if words]
+        return f"{before} → {counted(now)} of {counted(of)} cases inside{''.join(because)}"
 
     @property
     def worse(self) -> bool:
@@ -262,7 +265,8 @@ def _verdict_changes(manifests: Any, tables: Any, ok: Any) -> tuple[VerdictChang
         ends = [verdicts.get(name) for verdicts in judged_runs]
         before, after = (None if verdict is None else verdict.outcome for verdict in ends)
         a, b = (None if verdict is None else (verdict.passed, verdict.tried) for verdict in ends)
-        changes.append(VerdictChange(name, before, after, (a, b)))
+        failing = _both(ends, lambda verdict: "" if verdict is None else verdict.failing_words)
+        changes.append(VerdictChange(name, before, after, (a, b), failing))
     return tuple(changes)
 
 

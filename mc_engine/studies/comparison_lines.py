@@ -1,6 +1,7 @@
 """A comparison of two runs in lines for a terminal."""
 
 from collections.abc import Iterator
+from dataclasses import astuple
 
 import numpy as np
 
@@ -97,7 +98,8 @@ def _share_line(share: ShareChange, alpha: float) -> str:
 def _with_interval(estimate: Estimate) -> str:
     if not np.isfinite(estimate.value):
         return "-"
-    return f"{estimate.value:.3g} [{estimate.lower:.3g}, {estimate.upper:.3g}]"
+    value, lower, upper = (f"{round(end, estimate.decimals) + 0.0:.{estimate.decimals}f}" for end in astuple(estimate))
+    return f"{value} [{lower}, {upper}]"
 
 
 def _p_value_text(value: float, alpha: float) -> str:

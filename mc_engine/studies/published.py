@@ -38,7 +38,7 @@ compute = "campaigns.deorbit.published:pulse_width"    # a function of a module 
 arguments = { number = 1 }    # its keywords
 
 slow = true                   # takes longer than about 20 s
-repeatable_to = 0.01          # relative difference of ours between machines, for a search that amplifies rounding
+repeatable_to = 0.01          # relative difference of ours between machines, where rounding is amplified
 
 The computed numbers are in the generated file `published.lock.toml` (see `published_values`).  The outcome of a record
 is computed (`outcome`), never written.

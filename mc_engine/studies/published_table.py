@@ -49,7 +49,7 @@ def campaign_table(path: Path, values: Mapping[str, Value] | None = None) -> str
     for record in records:
         if "better" not in record:
             lines.append(
-                _row(record["quantity"], record.get("source", ""), *_numbers(record), _verdict(record, records))
+                _table_row(record["quantity"], record.get("source", ""), *_numbers(record), _verdict(record, records))
             )
     return "\n".join([*lines, *_improvements(records)])
 
@@ -65,7 +65,7 @@ def _improvements(records: Sequence[Record]) -> Iterator[str]:
         share = 100.0 * abs(record["ours"] / record["published"] - 1.0)
         by = f"{share:.2g} %" if outcome(record, records) != NOT_REACHED else "–"
         place = record.get("source", "")
-        yield _row(record["quantity"], place, *_numbers(record), by, _verdict(record, records))
+        yield _table_row(record["quantity"], place, *_numbers(record), by, _verdict(record, records))
 
 
 def headline_table(paths: Sequence[Path]) -> str:
@@ -79,7 +79,7 @@ def headline_table(paths: Sequence[Path]) -> str:
         link = f"[{source.campaign}](campaigns/{path.parent.name}/README.md)"
         outcomes = [outcome(record, records) for record in records]
         numbers = (str(outcomes.count(verdict)) for verdict in OUTCOMES)
-        counts.append(_row(link, source.work, str(len(records)), *numbers))
+        counts.append(_table_row(link, source.work, str(len(records)), *numbers))
         rows += _headlines(source.campaign, records)
     return "\n".join([*counts, "", *rows])
 
@@ -87,7 +87,7 @@ def headline_table(paths: Sequence[Path]) -> str:
 def _headlines(campaign: str, records: Sequence[Record]) -> Iterator[str]:
     for record in records:
         if record.get("headline"):
-            yield _row(campaign, record["quantity"], *_numbers(record), _verdict(record, records))
+            yield _table_row(campaign, record["quantity"], *_numbers(record), _verdict(record, records))
             campaign = ""
 
 
@@ -132,8 +132,8 @@ def _with_unit(value: str | float, unit: str, digits: int) -> str:
 
 
 def _head(*titles: str) -> list[str]:
-    return [_row(*titles), "|---" * len(titles) + "|"]
+    return [_table_row(*titles), "|---" * len(titles) + "|"]
 
 
-def _row(*cells: str) -> str:
+def _table_row(*cells: str) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

@@ -83,7 +83,17 @@ def cost_words(result: dict[str, Any]) -> str:
         text += f" ({result['no_number']:,} without a number)"
     if result["plain_cases"] is None or result["method"] == "plain":
         return text
-    return f"{text}; {result['plain_cases']:,.0f} plain ones would tell it with the same error"
+    return f"{text}; {plain_cases(result):,.0f} plain ones would tell it with the same error"
+
+
+def plain_cases(result: dict[str, Any]) -> float:
+    """Plain cases with the same standard error, in the three digits that such an estimate has."""
+    return float(f"{result['plain_cases']:.3g}")
+
+
+def accepted_percent(level: dict[str, Any]) -> str:
+    """The accepted fraction of a level in whole percent."""
+    return f"{100.0 * level['accepted']:.0f}"
 
 
 def _level_lines(result: dict[str, Any]) -> Iterator[str]:
@@ -91,7 +101,8 @@ def _level_lines(result: dict[str, Any]) -> Iterator[str]:
     yield f"{'level':<13}{'margin' + (f' [{unit}]' if unit else ''):>16}{'probability':>13}{'cases':>9}{'accepted':>10}"
     for number, level in enumerate(result["levels"]):
         margin = "all" if level["margin"] is None else f"{level['margin']:.4g}"
-        yield (f"{number:<13}{margin:>16}{level['probability']:>13.3g}{level['cases']:>9,}{level['accepted']:>10.0%}")
+        accepted = f"{accepted_percent(level)} %"
+        yield f"{number:<13}{margin:>16}{level['probability']:>13.3g}{level['cases']:>9,}{accepted:>10}"
 
 
 def _input_lines(result: dict[str, Any]) -> Iterator[str]:

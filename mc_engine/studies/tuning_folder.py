@@ -5,6 +5,7 @@
 All files are replaced together after each generation, so that a killed search leaves the result of a whole generation.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -41,7 +42,7 @@ class TuningRecord:
 
     @property
     def feasible(self) -> bool:
-        """Whether a candidate was found inside all limits."""
+        """Whether a candidate was found inside all constraints, if there are any, with a number for every metric."""
         return len(self.front) > 0
 
 
@@ -70,14 +71,35 @@ def tuning_lines(record: TuningRecord) -> list[str]:
     ]
     if not record.feasible:
         return [*lines, f"front        {infeasibility(record)}"]
-    lines.append(f"front        {len(record.front)} candidates")
+    lines.append(f"front        {front_words(record, '{:,}'.format)}")
     units = record.front.attrs["units"]
     for objective in tuning["objectives"]:
         values = record.front[objective["name"]]
         lines.append(
             f"  {objective['name']}  {values.min():.6g} to {values.max():.6g} {units[objective['name']]}".rstrip()
         )
-    return lines
+    not_searched = requirements_not_searched(record)
+    return [*lines, f"note         {not_searched}"] if not_searched else lines
+
+
+def front_words(record: TuningRecord, counted: Callable[[int], str]) -> str:
+    """What the candidates of the front have in common; counted : how a number of candidates is written."""
+    n = len(record.front)
+    candidates = f"{counted(n)} candidate{'s are' if n > 1 else ' is'}"
+    if record.manifest["tuning"]["constraints"]:
+        return f"{candidates} inside all constraints and beaten by no other"
+    return f"{candidates} beaten by no other; the search has no constraint"
+
+
+def requirements_not_searched(record: TuningRecord) -> str:
+    """A sentence on the campaign's requirements whose metric no constraint limits; empty if there are none."""
+    limited = {constraint["metric"] for constraint in record.manifest["tuning"]["constraints"]}
+    left_out = [item["name"] for item in record.manifest.get("requirements", []) if item["metric"] not in limited]
+    if not left_out:
+        return ""
+    return (
+        f"not part of the search, so that candidates may fail them: the campaign's requirements {', '.join(left_out)}"
+    )
 
 
 def infeasibility(record: TuningRecord) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, beyond_chance
-from reports.contributors.tornado_figure import STRONGEST, contributor_figure, name_of, strongest, surely
+from reports.contributors.tornado_figure import STRONGEST, contributor_figure, name_of, strongest, surely, surely_acts
 from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.run.chosen_units import spread_text
 from reports.run.contributions import MOST_METRICS, UNEXPLAINED, Contributions, Contributor
@@ -71,7 +71,9 @@ def _effect_table(flown: Flown, contributions: Contributions, shown: list[str]) 
             cells.append(_sigma_cell(flown, metric, contributor))
             cells += _trends(contributions.trends, contributor.input, k) if contributions.trends else []
             rows.append((cell, Cell(name_of(flown, contributor.input)), *cells))
-    return Table(f"Contributors to each metric, at most {STRONGEST}", columns, tuple(rows), _note(flown, contributions))
+    return Table(
+        f"Contributors to each metric, at most {STRONGEST}", columns, tuple(rows), _note(flown, contributions, shown)
+    )
 
 
 def _about(flown: Flown, contributions: Contributions, metric: str, k: int) -> Iterator[str]:
@@ -90,12 +92,14 @@ def _about(flown: Flown, contributions: Contributions, metric: str, k: int) -> I
         )
         rest = float(np.sqrt(max(sigma - explained, 0.0)) * np.sqrt(sigma + explained))  # squares may overflow
         told = [spread_text(flown, metric, value) for value in (sigma, explained, rest)]
-        yield f"σ {told[0]}; root sum square {told[1]}, rest {told[2]}"
+        beyond = f"rest {told[2]}" if explained <= sigma else "above σ by chance in the estimates"
+        yield f"σ {told[0]}; root sum square {told[1]}, {beyond}"
 
 
 def sigma_contribution(contributor: Contributor, sigma: float) -> float | None:
     """The part of a metric's σ that an input causes by itself; None where noise could have done so."""
-    if contributor.input == UNEXPLAINED or contributor.first is None or not surely(contributor.first_interval):
+    sure = surely(contributor.first_interval) and surely_acts(contributor)
+    if contributor.input == UNEXPLAINED or contributor.first is None or not sure:
         return None
     return float(np.sqrt(max(contributor.first, 0.0))) * sigma
 
@@ -115,8 +119,14 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _note(flown: Flown, contributions: Contributions) -> str:
+def _note(flown: Flown, contributions: Contributions, shown: list[str]) -> str:
     each = f"In brackets: {percent(flown.stated.confidence)} confidence interval."
+    rows = [row for metric in shown for row in strongest(contributions.by_metric[metric])]
+    if any(_beyond_total(row) for row in rows):
+        each += (
+            " Both effects are estimated separately: a first-order effect larger than its total effect, which no true "
+            "one is, is an error of the estimates."
+        )
     if contributions.trends is None:
         reduction = (
             " This reduction is flown for parameters that name a random draw; noise made in flight stays as drawn."
@@ -128,12 +138,11 @@ def _note(flown: Flown, contributions: Contributions) -> str:
             "the variance falls by another amount if the input is held at its nominal value. First-order and total "
             "effects and their intervals are within 0 to 1."
         ) + (reduction if contributions.held else "")
-    names = {row.input for rows in contributions.by_metric.values() for row in strongest(rows)}
     unexplained = (
         "Unexplained: fraction that the surrogate model behind the total effects attributes to no input (random "
         "draws, discontinuities); a total effect may be larger by up to it. With a section [sensitivity] in the "
         "campaign file, flights of their own compute what the random draws contribute. "
-    ) * (UNEXPLAINED in names)
+    ) * any(row.input == UNEXPLAINED for row in rows)
     note = (
         f"Estimated from the table of cases. {unexplained}{each} SRC, PRCC and Spearman: trends with their direction. "
         "R²: fraction of the variance that the linear regression behind SRC explains."
@@ -147,6 +156,13 @@ def _note(flown: Flown, contributions: Contributions) -> str:
                 "correlation; total effects require independent inputs and are left out."
             )
     return note
+
+
+def _beyond_total(contributor: Contributor) -> bool:
+    """Whether the first-order effect is printed larger than the total effect."""
+    if contributor.first is None or contributor.total is None:
+        return False
+    return round(contributor.first, 2) > round(contributor.total, 2)
 
 
 def _cell(value: float | None, interval: tuple[float, float] | None) -> Cell:

@@ -43,16 +43,12 @@ def name_of(flown: Flown, contributor: str) -> str:
 
 
 def strongest(contributors: Sequence[Contributor]) -> list[Contributor]:
-    """The largest contributor, others whose interval excludes zero, and the unexplained fraction."""
+    """The largest contributor, others that surely have an effect, and the unexplained fraction."""
     named = sorted(
         (contributor for contributor in contributors if contributor.input != UNEXPLAINED),
         key=lambda contributor: -contributor.size,
     )
-    sure = [
-        contributor
-        for contributor in named[1:STRONGEST]
-        if contributor.size >= SMALL and max(map(surely, intervals(contributor)))
-    ]
+    sure = [contributor for contributor in named[1:STRONGEST] if contributor.size >= SMALL and surely_acts(contributor)]
     return [
         *named[:1],
         *sure,
@@ -60,8 +56,12 @@ def strongest(contributors: Sequence[Contributor]) -> list[Contributor]:
     ]
 
 
-def intervals(contributor: Contributor) -> tuple[tuple[float, float] | None, ...]:
-    return contributor.first_interval, contributor.total_interval
+def surely_acts(contributor: Contributor) -> bool:
+    """Whether the total effect is surely above zero, as a first-order effect can be none without it.
+
+    Without a total effect (inputs are correlated), whether the first-order effect is.
+    """
+    return surely(contributor.first_interval if contributor.total is None else contributor.total_interval)
 
 
 def surely(interval: tuple[float, float] | None) -> bool:

@@ -109,6 +109,11 @@ GLOSSARY = Terms(
             "among all that were tested. A difference, not a proof of a cause.",
         ),
         (
+            "margin",
+            "Distance inside the nearest limit, negative outside. In percent: of the size of a single limit, or of "
+            "half the distance between two, so that 100 % is midway between them.",
+        ),
+        (
             "worst cases",
             "Those with the smallest margin to the nearest limit; of a metric without a requirement, the largest. The "
             "tables show the inputs that contribute most.",

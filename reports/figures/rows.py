@@ -8,7 +8,7 @@ from reports.drawing.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot, P
 from reports.drawing.palette import BLUE, GREEN, INK, MUTED, ORANGE, PAPER, SKY, VERMILION
 from reports.text.numbers import SPACE, count, number
 
-MOST_MARGIN = 1.0  # of the width of the limits, either way; margins beyond are drawn at the edge
+MOST_MARGIN = 1.0  # of the reach of the limits, either way; margins beyond are drawn at the edge
 TONES = {"good": GREEN, "bad": VERMILION, "open": MUTED}
 SPREAD = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)  # probabilities of what is drawn of a level
 SPANS = ((0, 6, MUTED, 1.2, "all cases"), (1, 5, SKY, 7.0, "5 % to 95 %"),
@@ -17,7 +17,7 @@ FAR_APART = 30.0  # levels whose medians differ by such a ratio are drawn on a l
 
 
 def margin_figure(names: Sequence[str], margins: np.ndarray, tones: Sequence[str]) -> Drawing:
-    """Margins of requirements over the width of their limits, negative outside.
+    """Margins of requirements over the reach of their limits, negative outside.
 
     margins : float64[n, 2], the demonstrated one, NaN if there is none, and that of the worst case.
     tones : of the verdicts, "good", "bad" or "open".
@@ -43,9 +43,9 @@ def margin_figure(names: Sequence[str], margins: np.ndarray, tones: Sequence[str
         Limit(0.0, "x", VERMILION, "limit", key="limit"),
     )
     ends = np.r_[x, worst, 0.0]
-    across = Axis("margin over width of the limits [%]", reach=(float(ends.min()) - 5.0, float(ends.max()) + 5.0))
+    across = Axis("margin relative to the limits [%]", reach=(float(ends.min()) - 5.0, float(ends.max()) + 5.0))
     plot = Plot(marks, across, names_axis(labels, down=True), height=70.0 + 26.0 * len(names))
-    return Drawing("Margins relative to the width of the limits", (plot,), 1, "; ".join(texts))
+    return Drawing("Margins relative to the limits", (plot,), 1, "; ".join(texts))
 
 
 def change_panel(

@@ -118,10 +118,10 @@ def kml(places: Places) -> bytes:
     _outline_folder(document, places)
     marks = _folder(document, "Named places")
     for mark in places.marks:
-        _place(marks, mark.name, "mark", mark.latitude, mark.longitude)
+        _placemark(marks, mark.name, "mark", mark.latitude, mark.longitude)
     cases = _folder(document, "Cases")
     for case, status, north, east in _cases(places):
-        placemark = _place(cases, f"case {case}", "case", north, east)
+        placemark = _placemark(cases, f"case {case}", "case", north, east)
         _data(placemark, {"case_id": case, "status": status})
     ElementTree.indent(root, " ")
     text = ElementTree.tostring(root, encoding="unicode")
@@ -162,7 +162,7 @@ def _folder(document: ElementTree.Element, name: str) -> ElementTree.Element:
     return folder
 
 
-def _place(
+def _placemark(
     folder: ElementTree.Element, name: str, style: str, latitude: float, longitude: float
 ) -> ElementTree.Element:
     placemark = ElementTree.SubElement(folder, "Placemark")

@@ -255,7 +255,7 @@ def _worst_records(flown: Flown, verdict: Verdict) -> list[WorstRecord]:
     limits = Limits(verdict.at_most, verdict.at_least)
     worst = flown.every.worst(verdict.metric, WORST, limits)
     values = worst[verdict.metric].to_numpy(dtype=np.float64)
-    margins = limits.margins(values) * limits.width
+    margins = limits.margins(values) * limits.reach
     return [
         WorstRecord(requirement=verdict.name, case_id=int(case), value=float(value), margin=float(margin))
         for case, value, margin in zip(worst["case_id"], values, margins, strict=True)

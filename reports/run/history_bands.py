@@ -25,7 +25,7 @@ def envelope_probabilities(n_cases: int) -> tuple[float, ...]:
 
 
 def fair_cases(case_ids: Sequence[int]) -> list[int]:
-    """Of the retained cases those that stand for all: 0, 1, 2, ... up to the first gap.
+    """Of the cases with a saved history those that stand for all: 0, 1, 2, ... up to the first gap.
 
     A case further on may have been kept because it is one of the worst; a band over such cases would be too wide.
     """

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from mc_engine.shell_words import shell_word
 from mc_engine.statistics.first_order import Contributor, contributors
 from mc_engine.statistics.worst import Limits
 from reports.document.blocks import Cell, Column, Table
@@ -103,13 +102,13 @@ def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFr
         cells.append(_number_cells(values))
         if limits != Limits():
             columns.append(Column(axis_label("Margin", flown.unit(metric)), "number"))
-            cells.append(_number_cells(limits.margins(values) * limits.width))
+            cells.append(_number_cells(limits.margins(values) * limits.reach))
     for fact in shown:
         columns.append(Column(axis_label(flown.words(fact.name), fact.unit), "number"))
         cells.append(_input_cells(cases[fact.name]))
     if not flown.manifest.get("imported"):  # such cases cannot be flown again
-        columns.append(Column("Command to replay", "code"))
-        cells.append([Cell(f"mc-engine replay {shell_word(flown.name)} {case}") for case in cases["case_id"]])
+        columns.append(Column("Command to replay, in the run’s folder", "code"))
+        cells.append([Cell(f"mc-engine replay . {case}") for case in cases["case_id"]])
     return Table(caption, tuple(columns), tuple(zip(*cells, strict=True)), _inputs_said(flown, ranked, len(shown)))
 
 

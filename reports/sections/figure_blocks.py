@@ -187,7 +187,7 @@ def _printed_normal(flown: Flown, name: str) -> tuple[float, float] | None:
 
 
 def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
-    """The model's history figures over all retained cases; a sentence in place of one without histories."""
+    """The model's history figures over all saved histories; a sentence in place of one without histories."""
     wanted = history_figures(flown)
     if not wanted:
         return
@@ -275,7 +275,7 @@ def is_constant(values: np.ndarray) -> bool:
 
 
 def history_cases(flown: Flown) -> dict[int, tuple[str, int | None]]:
-    """Name and rank of the retained cases: nominal 0, then by how bad they are in the metrics that matter."""
+    """Name and rank of the cases with histories: nominal 0, then by how bad they are in the metrics that matter."""
     kept = [int(case) for case in np.unique(flown.histories["case_id"].to_numpy())]
     reasons = _worst_reasons(flown)
     ordered = sorted((case for case in kept if case in reasons), key=lambda case: reasons[case][0])

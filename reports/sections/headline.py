@@ -3,14 +3,14 @@
 from collections.abc import Iterator
 
 from mc_engine.model.figures import MapFigure
-from mc_engine.shell_words import shell_word
 from mc_engine.statistics import Summary, Verdict
 from mc_engine.statistics.worst import Limits
 from mc_engine.status import OK, STATUS_NAME
 from reports.document.blocks import Card
 from reports.run.flown import Flown
+from reports.sections.requirement_tables import demonstrated_text
 from reports.sections.tables import TONES, limit_text
-from reports.text.numbers import beside_limit, count, limit_number, number, percent, percentile, with_unit
+from reports.text.numbers import count, limit_number, number, percent, percentile, with_unit
 
 MOST_COSTS = 4
 
@@ -32,21 +32,20 @@ def _verdict_card(flown: Flown, verdict: Verdict) -> Card:
     return Card(
         label=verdict.name,
         answer=verdict.outcome,
-        detail=f"{asked} for {wanted}: {counted}{_because(flown, verdict)}.",
+        detail=f"{asked} for {wanted}: {counted}{_because(verdict)}.",
         tone=TONES[verdict.outcome],
     )
 
 
-def _because(flown: Flown, verdict: Verdict) -> str:
+def _because(verdict: Verdict) -> str:
     """The counts behind a verdict, as the end of a sentence."""
     lost = f", {count(verdict.no_number)} of the others without a number" if verdict.no_number else ""
     if verdict.lower is None or verdict.upper is None:
         return f"{lost}; " + (
             "no case was flown" if not verdict.tried else "the cases of this design are not a random sample"
         )
-    if verdict.outcome == "fail" and verdict.upper >= verdict.share:  # the joint one, for another's failing
-        failing = [verdict.name for verdict in flown.verdicts if verdict.shared_outcome == "fail"]
-        return f"{lost}; {' and '.join(failing)} {'fails' if len(failing) == 1 else 'fail'} with confidence shared"
+    if verdict.failing:
+        return f"{lost}; {verdict.failing_words}"
     if verdict.outcome == "fail":
         return f"{lost}; the true probability is at most {percent(verdict.upper)}"
     needed = f", {count(verdict.needed)} cases without a further failure would demonstrate it" if verdict.needed else ""
@@ -75,31 +74,37 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
         median, nominal = summary.at(0.5), flown.nominal_value(name)
         rest = [f"nominal {number(nominal, 4, spread)}"] if nominal is not None else []
         rest.append(f"median {number(median.value, 4, spread) if median else '–'}")
+        demonstrated = _demonstrated(flown, name, limits)
         if limits == Limits() or limits.two_sided:
-            rest += _tails(flown, summary, flown.stated.outer)
             low, high = (number(end, 4, spread) for end in (summary.minimum, summary.maximum))
-            answer = f"{low} to {with_unit(high, unit)} in the cases flown{_against(limits, unit)}"
-            yield Card(flown.words(name), answer, f"{'; '.join([*rest, f'from {used}'])}.")
+            rest += [f"{low} to {high} in the cases flown"] if demonstrated else _tails(flown, summary)
+            answer = demonstrated or f"{low} to {with_unit(high, unit)} in the cases flown"
+            yield Card(flown.words(name), f"{answer}{_against(limits, unit)}", f"{'; '.join([*rest, f'from {used}'])}.")
             continue
         large = limits.at_most is not None
         probability = flown.stated.probability if large else flown.stated.low
         end, tail = summary.maximum if large else summary.minimum, summary.at(probability)
         rest.append(f"{'largest' if large else 'smallest'} {number(end, 4, spread)}")
         rest += [f"{percentile(probability)} {number(tail.value, 4, spread)}"] if tail and flown.random else []
-        shown, where = number(end, 4, spread), "in the cases flown"
-        for verdict in flown.verdicts:  # what the verification matrix says is demonstrated, in the same digits
-            if verdict.metric == name and verdict.demonstrated is not None:
-                shown = beside_limit(verdict.demonstrated, verdict.margin)
-                where = f"in {percent(verdict.share, 3)} of cases, {percent(verdict.confidence)} confidence"
-                break
-        answer = f"at {'most' if large else 'least'} {with_unit(shown, unit)} {where}"
+        bound = demonstrated or f"{with_unit(number(end, 4, spread), unit)} in the cases flown"
+        answer = f"at {'most' if large else 'least'} {bound}"
         yield Card(flown.words(name), answer, f"{'; '.join([*rest, f'from {used}'])}.")
 
 
-def _tails(flown: Flown, summary: Summary, probabilities: tuple[float, ...]) -> Iterator[str]:
+def _demonstrated(flown: Flown, name: str, limits: Limits) -> str:
+    """What the verification matrix says is demonstrated of a metric, in the same digits; empty without it."""
+    for verdict in flown.verdicts:
+        known = verdict.enclosed if limits.two_sided else verdict.demonstrated
+        if verdict.metric == name and known is not None:
+            where = f"in {percent(verdict.share, 3)} of cases, {percent(verdict.confidence)} confidence"
+            return f"{demonstrated_text(verdict, flown.unit(name))} {where}"
+    return ""
+
+
+def _tails(flown: Flown, summary: Summary) -> Iterator[str]:
     """Outer percentiles with their confidence bounds, those that the cases are enough for."""
     each = percent(flown.stated.confidence)
-    for probability in probabilities if flown.random else ():
+    for probability in flown.stated.outer if flown.random else ():
         quantile, upper = summary.at(probability), probability > 0.5
         bound = None if quantile is None else (quantile.upper if upper else quantile.lower)
         if quantile is not None and bound is not None:
@@ -132,7 +137,7 @@ def warnings(flown: Flown) -> tuple[str, ...]:
     if missing > 0:
         sentences.append(
             f"The run is not complete: {count(missing)} of {count(flown.n_wanted)} cases are missing; "
-            f"mc-engine resume {shell_word(flown.name)} flies them."
+            "“mc-engine resume .”, typed in the run’s folder, flies them."
         )
     if flown.n_tried and not flown.every.completed:
         sentences.append(f"All {count(flown.n_tried)} cases failed: no metric has a number.")

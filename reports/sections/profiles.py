@@ -19,7 +19,7 @@ CLOSED = 0.1  # of both ranges: a curve that ends nearer to its beginning is clo
 
 
 def profile_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
-    """The model's profiles over the retained cases; a sentence in place of one without histories."""
+    """The model's profiles over the saved histories; a sentence in place of one without histories."""
     for figure in flown.figures:
         if isinstance(figure, ProfileFigure) and len(flown.histories):
             yield _profile_block(flown, figure)

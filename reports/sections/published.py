@@ -47,7 +47,7 @@ def published_blocks(flown: Flown) -> Iterator[Table | Text | str]:
     computed = [(record, *our_value(flown, record)) for record in records]
     known = [{**record, "ours": ours} for record, ours, _ in computed if ours is not None]
     places = [where for _, ours, where in computed if ours is not None]
-    rows = tuple(_row(record, where, outcome(record, known)) for record, where in zip(known, places, strict=True))
+    rows = tuple(_value_row(record, where, outcome(record, known)) for record, where in zip(known, places, strict=True))
     columns = (
         Column("Quantity", "text"),
         Column("Published", "number"),
@@ -70,7 +70,7 @@ def published_blocks(flown: Flown) -> Iterator[Table | Text | str]:
         yield Text((f"mc-engine published {flown.manifest['model']['name']} --compute",), "code")
 
 
-def _row(record: Mapping[str, Any], where: str, verdict: str) -> tuple[Cell, ...]:
+def _value_row(record: Mapping[str, Any], where: str, verdict: str) -> tuple[Cell, ...]:
     unit = str(record.get("unit", ""))
     published, ours = record.get("published", ""), record["ours"]
     remark = record.get("reason", "") if verdict in WITH_REASON else record.get("note", "")
@@ -79,7 +79,7 @@ def _row(record: Mapping[str, Any], where: str, verdict: str) -> tuple[Cell, ...
         Cell(str(record.get("quantity", "")), small=str(record.get("source", ""))),
         Cell(_text(published, unit, exact), _as_number(published), small="" if status == "legible" else status),
         Cell(_text(ours, unit, lambda value: number(value, 8)), _as_number(ours), small=where),
-        _difference(ours, published, unit),
+        _difference_cell(ours, published, unit),
         Cell(verdict, small=str(remark), tone=TONES[verdict]),
     )
 
@@ -183,7 +183,7 @@ def _text(value: Any, unit: str, form: Callable[[float], str]) -> str:
     return with_unit(form(plain), unit)
 
 
-def _difference(ours: Any, published: Any, unit: str) -> Cell:
+def _difference_cell(ours: Any, published: Any, unit: str) -> Cell:
     mine, printed = _as_number(ours), _as_number(published)
     if mine is None or printed is None or not np.isfinite(mine):
         return Cell("–")

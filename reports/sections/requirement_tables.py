@@ -1,4 +1,4 @@
-"""The tables of requirements: what was asked, what the cases show, and how much the verdicts can be wrong."""
+"""The tables of requirements: what is required, what the cases show, and how much the verdicts can be wrong."""
 
 from collections.abc import Iterator
 
@@ -32,7 +32,7 @@ def margin_block(flown: Flown) -> FigureBlock | None:
             left_out.append(verdict.name)
             continue
         worst = limits.margins(flown.every.worst(verdict.metric, 1, limits)[verdict.metric].to_numpy(dtype=np.float64))
-        demonstrated = None if verdict.margin is None else verdict.margin / limits.width
+        demonstrated = None if verdict.margin is None else verdict.margin / limits.reach
         if worst.size:
             names.append(verdict.name)
             margins.append((demonstrated, float(worst[0])))
@@ -40,8 +40,8 @@ def margin_block(flown: Flown) -> FigureBlock | None:
     if not names:
         return None
     return FigureBlock(
-        "Margins of the requirements, relative to the width of the limits: the distance between two limits, the size "
-        "of a single one. Margins beyond 100 % are drawn at the edge."
+        "Margins of the requirements, relative to the size of the limit, or to half the distance between two limits: "
+        "midway between them is 100 %. Margins beyond 100 % are drawn at the edge."
         + f" Not drawn, the limit is 0: {', '.join(left_out)}."
         * bool(left_out),
         margin_figure(names, np.array(margins, dtype=np.float64), tones),
@@ -69,7 +69,7 @@ def requirement_table(flown: Flown) -> Table:
     rows = [_requirement_row(flown, *pair) for pair in zip(flown.verdicts, sources, strict=True)]
     note = (
         "Margin: from the demonstrated bound (tolerance limit) to the nearest limit; in brackets, relative to the "
-        "width of the limits. "
+        "size of the limit, or to half the distance between two. "
         f"Demonstrated probability: observed fraction of the cases, in brackets {_bounds_named(flown)}. A failed case, "
         "or one whose metric is not a number, counts as outside."
     )
@@ -102,7 +102,7 @@ def _requirement_row(flown: Flown, verdict: Verdict, source: str) -> tuple[Cell,
     return (
         Cell(verdict.name, small=what),
         Cell(limit_text(verdict, unit) if verdict.metric else "all limits", small=asked),
-        Cell(_limit_shown(verdict, unit)),
+        Cell(demonstrated_text(verdict, unit)),
         _margin_cell(verdict, unit),
         Cell(f"{count(verdict.passed)} / {count(verdict.tried)}", verdict.passed, lost),
         Cell(percent(verdict.estimate), verdict.estimate, bounds),
@@ -114,11 +114,12 @@ def _margin_cell(verdict: Verdict, unit: str) -> Cell:
     if verdict.margin is None:
         return Cell("–")
     limits = Limits(verdict.at_most, verdict.at_least)
-    share = f"({number(100.0 * verdict.margin / limits.width, 3)}{SPACE}%)" if _has_width(limits) else ""
+    share = f"({number(100.0 * verdict.margin / limits.reach, 3)}{SPACE}%)" if _has_width(limits) else ""
     return Cell(with_unit(number(verdict.margin, 3), unit), verdict.margin, share)
 
 
-def _limit_shown(verdict: Verdict, unit: str) -> str:
+def demonstrated_text(verdict: Verdict, unit: str) -> str:
+    """The demonstrated bound, or both of a requirement with two limits, in digits that show the margin."""
     if verdict.enclosed is not None:
         low, high = verdict.enclosed
         fine = 0.01 * (high - low)  # the ends to four digits of the width

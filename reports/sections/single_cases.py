@@ -157,7 +157,7 @@ def _drawn_cases(sections: Iterable[Section]) -> Iterator[np.ndarray]:
 
 
 def case_histories(flown: Flown) -> tuple[dict[int, dict[str, tuple[Any, Any]]], int]:
-    """Thinned curves of the retained and replayed cases: the nominal, the worst, the failed, then the others.
+    """Thinned curves of the saved and replayed histories: the nominal, the worst, the failed, then the others.
 
     Returns them by case and quantity, and how many cases the budget leaves out.
     """

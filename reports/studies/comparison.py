@@ -1,6 +1,7 @@
 """What `mc-engine compare A B --report FILE` writes: the comparison of two runs as a page or as a PDF."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import astuple
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -29,7 +30,7 @@ from reports.run.chosen_units import ShownRun, chosen_unit
 from reports.run.flown import Flown, Run
 from reports.studies.comparison_figure import change_figure
 from reports.studies.comparison_overlays import overlay_blocks
-from reports.text.numbers import axis_label, count, number, percent, words
+from reports.text.numbers import axis_label, count, fixed, number, percent, words
 
 LEAST_P = 1e-12  # a smaller p-value means no more
 ROUNDING = 1e-12  # of a mean: a smaller standard deviation is none
@@ -238,7 +239,7 @@ def _metric_table(comparison: Comparison, units: Mapping[str, str], moved: list[
     note = (
         "Significant changes first, each kind by its size. "
         f"Small: the {percent(comparison.confidence)} interval of the quantity that the test "
-        "is of; cases used of cases flown. σ: standard deviation of run A."
+        "is of; cases used of cases flown. σ: standard deviation of run A. *: significant, for better or worse."
     )
     rows = tuple(_metric_row(comparison, change, units[change.metric]) for change in moved)
     return Table("Metrics of both runs", columns, rows, note)
@@ -271,15 +272,17 @@ def _number_cell(value: float, scale: float) -> Cell:
 def _estimate_cell(estimate: Estimate) -> Cell:
     if not finite(estimate):
         return Cell("–")
-    ends = f"[{number(estimate.lower, 3)}, {number(estimate.upper, 3)}]"
-    return Cell(number(estimate.value, 3), estimate.value, ends)
+    value, lower, upper = (
+        fixed(end, estimate.decimals) if np.isfinite(end) else number(end) for end in astuple(estimate)
+    )
+    return Cell(value, estimate.value, f"[{lower}, {upper}]")
 
 
 def _p_value_cell(value: float, alpha: float) -> Cell:
     if not np.isfinite(value):
         return Cell("no test")
     text = number(value, 2) if value >= LEAST_P else f"< {number(LEAST_P, 2)}"
-    return Cell(text, value, tone="bad" if value <= alpha else "")
+    return Cell(f"{text} *" if value <= alpha else text, value)
 
 
 # ---- shares and requirements
@@ -290,10 +293,13 @@ def _share_table(comparison: Comparison) -> Table:
         Column("Cases", "text"),
         Column("Run A", "number"),
         Column("Run B", "number"),
-        Column("Difference", "number"),
+        Column("Difference [percentage points]", "number"),
         Column("Adjusted p", "number"),
     )
-    note = "Requirements are counted by the limits of run B in both runs; a case without a number is outside."
+    note = (
+        "Requirements are counted by the limits of run B in both runs; a case without a number is outside. "
+        "*: significant, for better or worse."
+    )
     return Table(
         "Fractions of the cases in both runs",
         columns,
@@ -307,11 +313,12 @@ def _share_row(change: ShareChange, alpha: float) -> tuple[Cell, ...]:
         Cell(percent(k / n) if n else "–", k / n if n else None, f"{count(k)} / {count(n)}")
         for k, n in zip(change.counted, change.tried, strict=True)
     ]
+    in_percent = Estimate(*(100.0 * end for end in astuple(change.difference)))
     pairs = f"{count(change.lost)} lost, {count(change.gained or 0)} gained" if change.lost is not None else ""
     return (
         Cell(change.name, small=pairs),
         *runs,
-        _estimate_cell(change.difference),
+        _estimate_cell(in_percent),
         _p_value_cell(change.adjusted, alpha),
     )
 

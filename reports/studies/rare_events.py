@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.studies.rare_event_folder import RareEventRecord
+from mc_engine.studies.rare_event_folder import RareEventRecord, accepted_percent, plain_cases
 from reports.document.blocks import (
     Block,
     Card,
@@ -168,7 +168,7 @@ def _cost_cards(result: dict[str, Any]) -> Iterator[Card]:
         yield Card(
             label="cases",
             answer=count(result["cases"]),
-            detail=f"Plain Monte Carlo needs {number(float(f'{plain:.3g}'))} for the same standard error, "
+            detail=f"Plain Monte Carlo needs {count(round(plain_cases(result)))} for the same standard error, "
             f"{number(plain / result['cases'], 3)} times as many.",
         )
 
@@ -300,10 +300,10 @@ def _level_table(result: dict[str, Any]) -> Table:
         (
             Cell(str(k), k),
             Cell("all" if level["margin"] is None else number(level["margin"], 4), level["margin"]),
-            Cell(number(level["probability"], 4), level["probability"]),
+            Cell(number(level["probability"], 3), level["probability"]),
             Cell(str(level["runs"]), level["runs"]),
             Cell(count(level["cases"]), level["cases"]),
-            Cell(percent(level["accepted"], 0), level["accepted"]),
+            Cell(f"{accepted_percent(level)}{SPACE}%", level["accepted"]),
         )
         for k, level in enumerate(result["levels"])
     ]

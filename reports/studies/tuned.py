@@ -1,4 +1,4 @@
-"""A tuning as its report sees it: the tables, what was asked, and the front that is drawn."""
+"""A tuning as its report sees it: the tables, its goals, and the front that is drawn."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -63,7 +63,7 @@ def inside(values: np.ndarray, constraint: Mapping[str, Any]) -> np.ndarray:
 
 
 def limit_words(tuned: Tuned, constraint: Mapping[str, Any]) -> str:
-    limits = [("at most", constraint.get("at_most")), ("at least", constraint.get("at_least"))]
+    limits = [("at least", constraint.get("at_least")), ("at most", constraint.get("at_most"))]
     texts = [
         f"{word} {with_unit(exact(limit), tuned.units[constraint['name']])}"
         for word, limit in limits

@@ -5,7 +5,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mc_engine.studies.tuning_folder import UNFINISHED, TuningRecord, infeasibility
+from mc_engine.studies.tuning_folder import (
+    UNFINISHED,
+    TuningRecord,
+    front_words,
+    infeasibility,
+    requirements_not_searched,
+)
 from reports.document.blocks import Block, Card, Document, FigureBlock, Section, Table, Terms, Text, as_blocks, numbered
 from reports.drawing.marks import Axis, Drawing, Line, Plot, stepped
 from reports.drawing.palette import BLUE
@@ -27,7 +33,7 @@ from reports.text.numbers import SPACE, count
 GLOSSARY = Terms(
     (
         ("candidate", "One choice of the tuned parameters, flown as the nominal case or as the same dispersed cases."),
-        ("feasible", "Inside all constraints, with a number for every metric."),
+        ("feasible", "Inside all constraints, if there are any, with a number for every metric."),
         (
             "front",
             "Of all feasible candidates that were flown, those that no other one equals or beats in every objective "
@@ -81,8 +87,7 @@ def build_tuning(record: TuningRecord, name: str) -> Document:
 
 def _front_sentence(tuned: Tuned) -> str:
     if tuned.record.feasible:
-        n = len(tuned.front)
-        return f"{count(n)} candidate{'s are' if n > 1 else ' is'} inside all limits and not beaten by any other."
+        return f"{front_words(tuned.record, count)}."
     sentence = re.sub(r"(?<=\d),(?=\d{3})", SPACE, infeasibility(tuned.record))
     sentence = re.sub(r"-(?=\d)", "−", sentence)
     return f"{sentence[:1].upper()}{sentence[1:]}."
@@ -137,9 +142,11 @@ def _objective_cards(tuned: Tuned) -> Iterator[Card]:
 def _search_warnings(tuned: Tuned) -> Iterator[str]:
     if not tuned.record.feasible:
         yield (
-            "There is no front: no candidate is inside all limits. The figure and the table of the best candidates "
-            "ignore the limits."
+            "There is no front: no candidate is feasible. The figure and the table of the best candidates ignore the "
+            "constraints."
         )
+    if not_searched := requirements_not_searched(tuned.record):
+        yield f"{not_searched[:1].upper()}{not_searched[1:]}.".replace("'", "’")
     failed = int((tuned.evaluations["failed_cases"] > 0).sum())
     if failed:
         ends = tuned.evaluations["commonest_failure"][tuned.evaluations["failed_cases"] > 0].value_counts(sort=False)
@@ -187,7 +194,7 @@ def _front_figure(tuned: Tuned) -> FigureBlock:
         first_small=tuned.plan["objectives"][0]["goal"] == "minimise",
     )
     beyond = candidates_beyond(drawing.plots[0])
-    caption = "Every candidate and the front" if tuned.record.feasible else "Every candidate; none is inside all limits"
+    caption = "Every candidate and the front" if tuned.record.feasible else "Every candidate; none is feasible"
     outside = f". {count(beyond)} candidates lie beyond the axes" if beyond else ""
     thinner = (
         f". At most {count(POINTS_SHOWN)} of each kind are drawn" if any(len(p) > POINTS_SHOWN for p in parts) else ""

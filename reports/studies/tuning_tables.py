@@ -1,4 +1,4 @@
-"""The tables of a tuning's report: the front, the published points, what was asked, and where the numbers come from."""
+"""The tables of a tuning's report: the front, the published points, its goals, and where the numbers come from."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any

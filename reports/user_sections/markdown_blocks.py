@@ -50,7 +50,7 @@ class _Reader:
         place = 0
         while place < len(self.tokens):
             token = self.tokens[place]
-            end = _end(self.tokens, place)
+            end = _closing_token(self.tokens, place)
             self.line = token.map[0] + 1 if token.map else self.line
             yield from self._blocks(token, self.tokens[place:end])
             place = end
@@ -81,7 +81,7 @@ class _Reader:
             yield Text((text,))
 
 
-def _end(tokens: Sequence[Token], place: int) -> int:
+def _closing_token(tokens: Sequence[Token], place: int) -> int:
     """Index after the token that closes the one at `place`."""
     level = 0
     for index in range(place, len(tokens)):

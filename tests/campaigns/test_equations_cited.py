@@ -4,8 +4,12 @@ import ast
 import re
 
 from mc_engine.campaign.search import SHIPPED
+from mc_engine.units import UNITS
 
-UNIT = re.compile(r"\[[^\]]+\]|\bSI\b|\bunits?\b|(in|and) shares|fraction")
+BRACKETS = re.compile(r"\[([^\]]+)\]")
+WORD = re.compile(r"[^\W\d]+|%")
+SYMBOLS = {symbol for unit in UNITS for symbol in WORD.findall(unit)}
+UNIT = re.compile(r"\bSI\b|\bunits?\b(?! (matrix|variance))|(in|and) shares|fraction")
 # an equation, table, section, page or algorithm by its number, or the year of a work
 SOURCE = re.compile(r"\(\d+(\.\d+)?[a-z]?\)|\b(eqs?\.|algorithm|[Tt]able|[Ss]ection|pp?\.) ?\(?[\dIVX]|\b(19|20)\d\d\b")
 KEEPS_BOOKS = ("The memory", "The row")  # begins the docstring of one that computes no more than what is due next
@@ -18,7 +22,14 @@ def unsaid(source):
 
 
 def _says(docstring):
-    return docstring.startswith(KEEPS_BOOKS) or UNIT.search(docstring) or SOURCE.search(docstring)
+    units = any(_is_unit(text) for text in BRACKETS.findall(docstring))
+    return docstring.startswith(KEEPS_BOOKS) or units or UNIT.search(docstring) or SOURCE.search(docstring)
+
+
+def _is_unit(text):
+    """Whether a text in brackets is made of symbols of units, such as "m, m/s"; a shape, such as "n, 12", is not."""
+    symbols = WORD.findall(text)
+    return bool(symbols) and SYMBOLS.issuperset(symbols)
 
 
 def _computes(function):
@@ -38,6 +49,8 @@ def test_a_function_without_unit_and_source_is_noticed():
     assert unsaid(f"@physics\ndef pressure(density, speed):\n{body}") == ["pressure"]
     assert unsaid(f'@physics\ndef pressure(density, speed):\n    """Dynamic pressure."""\n{body}') == ["pressure"]
     assert unsaid(f'@physics\ndef pressure(density, speed):\n    """Dynamic pressure [Pa]."""\n{body}') == []
+    assert unsaid(f'@physics\ndef pressure(density, speed):\n    """Pressures [n, 3]."""\n{body}') == ["pressure"]
+    assert unsaid(f'@physics\ndef part(density, speed):\n    """A unit matrix [6]."""\n{body}') == ["part"]
     assert (
         unsaid(f"def flow():\n    def _pressure(density, speed):\n    {body}    return _pressure\n")[-1] == "_pressure"
     )

@@ -58,6 +58,16 @@ def test_a_reader_who_types_it_gets_a_checked_campaign_a_report_and_a_bit_exact_
     assert (here / "first" / "report.pdf").read_bytes().startswith(b"%PDF")
 
 
+def test_the_command_beside_a_worst_case_works_where_its_heading_says(flown, monkeypatch):
+    monkeypatch.chdir(flown[0] / "first")
+    page = Path("report.html").read_text(encoding="utf-8")
+    assert "Command to replay, in the run’s folder" in page
+    command = re.search(r">mc-engine (replay [^<]+)<", page)[1].split()
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0, done.output
+    assert f"case {command[-1]}: every stored number has the same bits" in done.output
+
+
 def test_the_reader_sees_what_lanes_give_in_the_words_of_the_text(flown):
     text = (TUTORIAL / "tutorial.md").read_text(encoding="utf-8")
     shown = text.split("$ mc-engine bench sounding_rocket\n")[1].split("```")[0]

@@ -3,16 +3,11 @@
 import hashlib
 import logging
 import shutil
-import sys
 import time
-from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "mc_engine"))
-from small_run import block, created, filled
 from stones import stones
+from typer.testing import CliRunner
 
 from mc_engine.command_line.commands import app
 from mc_engine.errors import StoreError
@@ -20,6 +15,7 @@ from mc_engine.store.derived_files import derived_files
 from mc_engine.store.object_store import Publisher, _Remote, fetch, publish
 from mc_engine.store.opening import open_store
 from mc_engine.store.verification import damage
+from tests.mc_engine.store.small_run import block, created, filled
 
 fsspec = pytest.importorskip("fsspec")
 

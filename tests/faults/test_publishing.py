@@ -6,18 +6,15 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "mc_engine"))
-from cart import call
-from small_run import ENVIRONMENT, created, filled
-
 from mc_engine.errors import StoreError
 from mc_engine.store.object_store import Publisher, _Remote, fetch, publish
 from mc_engine.store.opening import open_store
+from tests.mc_engine.command_line.cart import call
+from tests.mc_engine.store.small_run import ENVIRONMENT, created, filled
 
 pytest.importorskip("fsspec")
 

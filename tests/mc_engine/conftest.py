@@ -1,8 +1,9 @@
 """Folders that several tests of the engine begin with."""
 
 import pytest
-from cart import CAMPAIGN, MODEL
-from small_run import created
+
+from tests.mc_engine.command_line.cart import CAMPAIGN, MODEL
+from tests.mc_engine.store.small_run import created
 
 
 @pytest.fixture

@@ -7,10 +7,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-from small_run import ENVIRONMENT
 
 from mc_engine.command_line.next_step import is_complete
 from mc_engine.interruption import COMPLETING, NOTHING_BEGUN, ONCE_MORE
+from tests.mc_engine.store.small_run import ENVIRONMENT
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signals from process to process")
 

@@ -10,7 +10,6 @@ import sys
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from small_run import COLUMNS, ENVIRONMENT, MANIFEST, block
 from told import LONE, PAYLOAD, assert_harmless, told
 
 from mc_engine import load_campaign, open_run
@@ -19,6 +18,7 @@ from mc_engine.store.opening import open_store
 from mc_engine.store.store import create_store
 from mc_engine.studies.replay_files import history_figure
 from mc_engine.text import clean
+from tests.mc_engine.store.small_run import COLUMNS, ENVIRONMENT, MANIFEST, block
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals, and names are not bytes")
 REQUIREMENT = {"metric": "propellant_kg", "at_least": None, "share": 0.5, "confidence": 0.9, "at_most": 100.0}

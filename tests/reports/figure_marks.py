@@ -11,7 +11,7 @@ FORMS = {
     "footprint": "Impact points about the mean impact point",
     "histories": "Curves against time, the nominal case among them",
     "profile": "Curves along flights, the nominal case among them",
-    "margins": "Margins relative to the width of the limits",
+    "margins": "Margins relative to the limits",
     "front": "Candidates and the front of the objectives",
 }
 

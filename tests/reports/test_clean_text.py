@@ -2,21 +2,17 @@
 
 import io
 import json
-import sys
-from pathlib import Path
 
 import pypdf
 import pytest
 from payloads import hostile
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "mc_engine"))
-from told import HIDDEN, LONE, PAYLOAD, STEERING
 
 from reports import build, render_html, render_pdf
 from reports.document.blocks import Document, Section, Text
 from reports.formats.html import plotly_script
 from reports.formats.markdown import figure_files, render_markdown
 from reports.user_sections.sections import run_facts, with_own_sections
+from tests.mc_engine.told import HIDDEN, LONE, PAYLOAD, STEERING
 
 REFUSED = STEERING | HIDDEN | {LONE}
 SHOWN = r"\u202eevil\u2066\u200b\u2028"

@@ -40,7 +40,7 @@ def test_one_format_is_enough_if_asked_for(run_path):
 def test_no_path_of_this_machine_gets_into_the_page(run_path):
     page = reports.write_reports(run_path, ["html"])[0].read_text(encoding="utf-8")
     assert str(run_path.parent) not in page
-    assert "mc-engine replay deorbit-1 " in page
+    assert "mc-engine replay . " in page
     assert "timing: fly" in page
 
 

@@ -67,7 +67,7 @@ _KERNEL = kernel_of(_fly_all)
 def fly_burns(
     y: np.ndarray, mass: Numbers, duration: Numbers, thrust: float, flow: float, step: float = STEP
 ) -> np.ndarray:
-    """States [n, 12] at the end of burns that begin at the states y [n, 12], or [12] for all.
+    """States float64[n, 12], canonical units, at the end of burns from the states y, of that shape or [12] for all.
 
     mass, duration : float64[n], of the initial mass and of the canonical time, or a number for all; a negative
         duration is flown backward

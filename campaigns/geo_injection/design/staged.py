@@ -28,7 +28,7 @@ class Orbit:
     def apsis(self, side: float) -> np.ndarray:
         """Place and velocity [6] at perigee (side 1.0, on the ascending node) or apogee (-1.0, on the descending one).
 
-        The vis-viva equation at r = a (1 - side e).
+        The vis-viva equation at r = a (1 - side e), in canonical units.
         """
         r, i = self.a * (1.0 - side * self.e), self.inclination
         speed = np.sqrt((1.0 + side * self.e) / r)

@@ -21,7 +21,7 @@ from campaigns.reentry.guidance.reference_table import (
     by_speed,
     clocked_range,
 )
-from campaigns.reentry.inputs import APOLLO_LAW, LAW1, LAW2, LAW3, LAW3R, UNGUIDED
+from campaigns.reentry.inputs import CHOICES
 from mc_engine.lanes import acos, any_lane, asin, atan2, log, maximum, minimum, physics, replace, where
 from mc_engine.lanes.noise import normal_pair
 from mc_engine.physics.aerodynamics import axial_coefficient
@@ -81,12 +81,12 @@ def navigated_share(x, p, o):
     """
     row = BySpeed(*by_speed(o.tables, p.reference, x.speed))
     along = x.along - row.range - target_shift(p)
-    if o.guidance == LAW1:
+    if o.guidance == CHOICES.guidance.law1:
         high, tilt = x.altitude - row.altitude, x.path - row.path
     else:
         high = bounded(-SCALE_HEIGHT * (x.drag / row.drag - 1.0), LARGEST_CLIMB)
         tilt = (x.climb - row.climb) / x.speed
-    if o.guidance == LAW2:
+    if o.guidance == CHOICES.guidance.law2:
         along = 0.0
     return -(row.k_altitude * high + row.k_path * tilt + row.k_range * along)
 
@@ -138,7 +138,7 @@ def accelerometer_share(now, before, p, o):
     climb = -SCALE_HEIGHT * (growth + 2.0 * (now.axial - row.axial) / row.speed)
     tilt = bounded(climb / row.speed, LARGEST_TILT)
     along = now.range - row.range - target_shift(p)
-    if o.guidance == LAW3:
+    if o.guidance == CHOICES.guidance.law3:
         along = 0.0
     return -(row.k_altitude * high + row.k_path * tilt + row.k_range * along), row.speed
 
@@ -147,11 +147,11 @@ def accelerometer_share(now, before, p, o):
 def commanded_share(t, kept, x, p, o):
     """(vertical share of the lift before its limits, speed [m/s] by which the law goes, what law 3 keeps)."""
     now = kept
-    if o.guidance == LAW3 or o.guidance == LAW3R:
+    if o.guidance == CHOICES.guidance.law3 or o.guidance == CHOICES.guidance.law3r:
         now = reckoned(t, kept, x, p, o)
         change, speed = accelerometer_share(now, kept, p, o)
         share = p.planned_share + change
-    elif o.guidance == APOLLO_LAW:
+    elif o.guidance == CHOICES.guidance.apollo:
         share, speed = apollo_share(x, p, o), x.speed
     else:
         share, speed = p.planned_share + navigated_share(x, p, o), x.speed
@@ -163,7 +163,7 @@ def steer(t, s, m, p, o, draws):
     """One sample: sense, ask for a share of the lift, choose its side, and send the bank [rad] after it."""
     x = sensed(s, p, o, draws)
     share, speed, reckoning = commanded_share(t, m.reckoning, x, p, o)
-    if o.guidance == LAW3 or o.guidance == LAW3R:
+    if o.guidance == CHOICES.guidance.law3 or o.guidance == CHOICES.guidance.law3r:
         felt, load = x.axial, x.axial * x.load_by_axial
     else:
         felt, load = x.drag, x.drag * x.load_by_drag
@@ -191,6 +191,6 @@ def steer(t, s, m, p, o, draws):
 @physics
 def control(t, s, m, p, o, draws):
     """The memory after a sample; nothing happens without a law."""
-    if o.guidance != UNGUIDED:
+    if o.guidance != CHOICES.guidance.none:
         m = replace(m, steering=steer(t, s, m.steering, p, o, draws))
     return m

@@ -12,7 +12,7 @@ import numpy as np
 
 from campaigns.reentry.airframe import airframe_of
 from campaigns.reentry.entry_state import Entry, Planned, World, entry_of, world_of
-from campaigns.reentry.inputs import GUIDANCE, J2, NO_GRAVITY, PLAN_IS_GIVEN, Inputs
+from campaigns.reentry.inputs import CHOICES, GUIDANCE, Inputs
 from campaigns.reentry.vehicles import Vehicle
 from mc_engine.model import Parameter, Refusals
 from mc_engine.physics.constants import J2_EARTH
@@ -35,7 +35,7 @@ def planned_entry(
     i: SimpleNamespace, settings: SimpleNamespace, world: World, entry: Entry, refusals: Refusals
 ) -> Planned:
     """The entry that distances count from: each case's own without errors, or that of plan_..."""
-    given = settings.plan == PLAN_IS_GIVEN
+    given = settings.plan == CHOICES.plan.given
     if not given.any():
         return entry.planned
     inputs = vars(i) | {f"entry_{name}": getattr(settings, f"plan_{name}") for name in _OF_ENTRY}
@@ -45,14 +45,14 @@ def planned_entry(
 
 
 def plans_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, planned: Planned, airframe: Vehicle) -> Plan:
-    """The plan of each case: a `Plan` of float64[n]."""
-    given = settings.plan == PLAN_IS_GIVEN
-    numbers = given & (settings.vehicle < 0.5)  # one of vehicles.py brings its own
+    """The plan of each case: a `Plan` of float64[n], SI."""
+    given = settings.plan == CHOICES.plan.given
+    numbers = given & (settings.vehicle == CHOICES.vehicle.given)  # one of vehicles.py brings its own
     drag = airframe.reference_area * airframe.drag_coefficient / airframe.mass
     lift_to_drag = airframe.lift_coefficient / airframe.drag_coefficient
     return Plan(
-        **world._replace(mu=np.where(settings.gravity == NO_GRAVITY, 0.0, world.mu))._asdict(),
-        j2=np.where(settings.gravity == J2, J2_EARTH, 0.0),
+        **world._replace(mu=np.where(settings.gravity == CHOICES.gravity.none, 0.0, world.mu))._asdict(),
+        j2=np.where(settings.gravity == CHOICES.gravity.j2, J2_EARTH, 0.0),
         law=_LAW[settings.guidance.astype(int)],
         atmosphere=settings.atmosphere,
         vehicle=settings.vehicle,

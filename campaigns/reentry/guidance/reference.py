@@ -17,7 +17,7 @@ from campaigns.reentry.guidance.apollo_final_phase import influence_rows
 from campaigns.reentry.guidance.plan import Plan
 from campaigns.reentry.guidance.reference_table import FELT, LAST_SPEED, ROWS, SPREAD, STEERED, Header
 from campaigns.reentry.guidance.vinh import gravity, rates
-from campaigns.reentry.inputs import APOLLO, APOLLO_LAW, LAW2, US76
+from campaigns.reentry.inputs import CHOICES
 from campaigns.reentry.vehicles import apollo_shares
 from mc_engine.errors import ModelError
 from mc_engine.model import Refusals
@@ -54,11 +54,11 @@ def motion(plan: Plan, state, share):
     """(Vinh's rates of the state but its last, with a share of the lift in the vertical plane; drag, axial), SI."""
     r, _, latitude, v, path, heading = state[:6]
     h = height(plan, state)[0]
-    standard = plan.atmosphere == US76
+    standard = plan.atmosphere == CHOICES.atmosphere.us76
     density = us76_of_array(h) if standard else np.exp(plan.log_density - plan.inverse_scale * h)
     drag = 0.5 * density * v * v * plan.drag
     lift = drag * plan.lift_to_drag
-    if plan.vehicle == APOLLO:
+    if plan.vehicle == CHOICES.vehicle.apollo:
         temperature = us76_logarithm(h)[2] if standard else plan.temperature
         of_drag, of_lift = apollo_shares(v / sound_speed(temperature))
         drag, lift = of_drag * drag, of_lift * lift
@@ -191,10 +191,11 @@ def reference_table_of(plan: Plan) -> np.ndarray | str:
     """What `reference_table` reads, designed for one plan; or the sentence that says why there is no reference."""
     try:
         path = fly_reference(plan)
-        if plan.law == APOLLO_LAW:
+        if plan.law == CHOICES.guidance.apollo:
             speed, columns, by_loss = *influence_rows(), None
         else:
-            speed, columns, by_loss = _path_and_gains(plan, path, PROFILE_SET if plan.law == LAW2 else RANGE_SET)
+            weights = PROFILE_SET if plan.law == CHOICES.guidance.law2 else RANGE_SET
+            speed, columns, by_loss = _path_and_gains(plan, path, weights)
     except ModelError as error:
         return str(error)
     speed_density, speed_rows = _resampled(speed[0] - speed, columns)

@@ -8,6 +8,7 @@ import numpy as np
 from campaigns.geo_injection.design.continuation import optimum
 from campaigns.geo_injection.design.impulsive import propellant_share, two_impulses
 from campaigns.geo_injection.design.kept_programs import SEQUENCES
+from campaigns.geo_injection.design.staged import Orbit, staged
 from tests.campaigns.model_flights import ModelFlights
 
 FLIGHTS = ModelFlights("campaigns.geo_injection", width=None)
@@ -24,6 +25,15 @@ SIGMAS = {
 
 ELLIPTIC = {"initial_inclination_deg": 46.0, "parking_eccentricity": 0.2, "parking_argument_of_perigee_deg": 20.0}
 
+# burns, inclination [deg], and the orbits that the source prints in tables 2, 3, 7 and 8: a [km], e, i [deg]
+SOURCE = {
+    "planar, 2 burns": (2, 0.0, [(24_588, 0.7142, 0.0)]),
+    "28.5 deg, 2 burns": (2, 28.5, [(24_588, 0.7142, 26.0)]),
+    "55 deg, 2 burns": (2, 55.0, [(24_588, 0.7142, 52.0)]),
+    "planar, 3 burns": (3, 0.0, [(8733.1, 0.2456, 0.0), (24_438, 0.7247, 0.0)]),
+    "28.5 deg, 3 burns": (3, 28.5, [(8733.1, 0.2456, 27.0), (24_438, 0.7247, 25.0)]),
+}
+
 
 def dispersed(n, seed=2017):
     """Inputs of n cases of the spreads of campaign.toml."""
@@ -36,6 +46,13 @@ def sequence(burns, inclination_deg, thrust=THRUST, **parking):
     engine = {"thrust": thrust, "mass_flow": FLOW * thrust / THRUST}
     inclination = float(np.radians(inclination_deg))
     return replace(SEQUENCES["two_burns_28_5"], burns=burns, initial_inclination=inclination, **engine, **parking)
+
+
+def staged_over(name):
+    """(sequence, burns of the staged procedure over the orbits that the source prints for it)."""
+    burns, inclination, between = SOURCE[name]
+    item = sequence(burns, inclination)
+    return item, staged(item.problem(), tuple(Orbit(1e3 * a / PARKING, e, np.radians(i)) for a, e, i in between))
 
 
 @lru_cache(maxsize=64)

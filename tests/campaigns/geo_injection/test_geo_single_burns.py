@@ -4,21 +4,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from geo_sequences import GEO, MASS, MU, PARKING, sequence
+from geo_sequences import GEO, MASS, MU, PARKING, SOURCE, sequence, staged_over
 
 from campaigns.geo_injection.design.coast import coast
 from campaigns.geo_injection.design.single_burn import Stage, circle, fly_shortest, rise_guess
-from campaigns.geo_injection.design.staged import Orbit, rising, staged
+from campaigns.geo_injection.design.staged import rising
 from campaigns.geo_injection.published.burns import burn_s
 from campaigns.geo_injection.published.values import avoidance
-
-SOURCE = {
-    "planar, 2 burns": (2, 0.0, [(24_588, 0.7142, 0.0)]),
-    "28.5 deg, 2 burns": (2, 28.5, [(24_588, 0.7142, 26.0)]),
-    "55 deg, 2 burns": (2, 55.0, [(24_588, 0.7142, 52.0)]),
-    "planar, 3 burns": (3, 0.0, [(8733.1, 0.2456, 0.0), (24_438, 0.7247, 0.0)]),
-    "28.5 deg, 3 burns": (3, 28.5, [(8733.1, 0.2456, 27.0), (24_438, 0.7247, 25.0)]),
-}
 
 
 @pytest.mark.parametrize(
@@ -43,9 +35,7 @@ def test_the_source_s_guess_for_burns_between_ellipses_leads_to_the_same_apogee_
 
 @pytest.mark.parametrize("name", SOURCE)
 def test_staged_burns_make_one_continuous_flight_to_the_geostationary_circle(name):
-    burns, inclination, between = SOURCE[name]
-    item = sequence(burns, inclination)
-    stages = staged(item.problem(), tuple(Orbit(1e3 * a / PARKING, e, np.radians(i)) for a, e, i in between))
+    item, stages = staged_over(name)
     end = stages[-1].burn.end
     assert np.linalg.norm(end[:3]) * PARKING == pytest.approx(GEO, abs=0.01)
     assert np.linalg.norm(end[3:6]) * item.speed_unit == pytest.approx(np.sqrt(MU / GEO), abs=1e-6)

@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -27,7 +25,7 @@ source = "thrower"
 
 @pytest.fixture
 def folder(tmp_path):
-    (tmp_path / "toy.py").write_text(Path(__file__).parents[1].joinpath("toy.py").read_text())
+    (tmp_path / "toy.py").write_text((HERE / "toy.py").read_text())
     (tmp_path / "campaign.toml").write_text(TEXT)
     return tmp_path
 

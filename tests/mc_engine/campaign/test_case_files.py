@@ -1,7 +1,7 @@
 import numpy as np
 import pandas
 import pytest
-from toy import load, problems
+from toy import HERE, load, problems
 
 from mc_engine.campaign.tables_beside import empirical_numbers, read_columns
 from mc_engine.model.files import FileFault
@@ -59,9 +59,7 @@ BODY = '[dispersion.height_km]\ndist = "empirical"\nfile = "m.csv"\n'
 
 @pytest.fixture
 def folder(tmp_path):
-    from pathlib import Path
-
-    (tmp_path / "toy.py").write_text(Path(__file__).parents[1].joinpath("toy.py").read_text())
+    (tmp_path / "toy.py").write_text((HERE / "toy.py").read_text())
     write(tmp_path, "m.csv", "h\n9000\n11000\n10000\n")
     return tmp_path
 

@@ -1,9 +1,7 @@
-from pathlib import Path
-
 import numpy as np
 import pandas
 import pytest
-from toy import load, problems
+from toy import HERE, load, problems
 
 from mc_engine.campaign.cases import case_table, dispersion_records
 
@@ -13,7 +11,7 @@ CSV = "case_id,speed_pct,control,drag,height_km\n0,1.5,off,true,10\n1,-2,clipped
 
 @pytest.fixture
 def folder(tmp_path):
-    (tmp_path / "toy.py").write_text(Path(__file__).parents[1].joinpath("toy.py").read_text())
+    (tmp_path / "toy.py").write_text((HERE / "toy.py").read_text())
     (tmp_path / "cases.csv").write_text(CSV)
     return tmp_path
 

@@ -7,7 +7,6 @@ from hashlib import sha256
 import numpy as np
 import pandas as pd
 import pytest
-from cart import call, fails_with
 
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.errors import CampaignError, EngineError, StoreError
@@ -16,6 +15,7 @@ from mc_engine.store.journal import encode, scan
 from mc_engine.store.opening import open_store
 from mc_engine.store.verification import damage
 from mc_engine.studies.opened_run import open_run
+from tests.mc_engine.command_line.cart import call, fails_with
 
 MODEL = '''
 """A throw, straight up."""

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cart import call, fails_with
 
 import mc_engine
 from mc_engine import load_campaign, open_store
@@ -15,6 +14,7 @@ from mc_engine.campaign.orbit_messages import AXES, MessageFault, read_message
 from mc_engine.errors import CampaignError
 from mc_engine.runner import runner
 from mc_engine.sampling.correlation import normal_correlation
+from tests.mc_engine.command_line.cart import call, fails_with
 
 # The example OPM of CCSDS 502.0-B, annex: state [km, km/s] and lower triangle of the covariance [km, km/s].
 STATE = (6655.9942, -40218.5751, -82.9177, 3.11548208, 0.47042605, -0.00101495)

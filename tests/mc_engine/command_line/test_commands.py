@@ -6,12 +6,12 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 from cart import CAMPAIGN, MODEL, call, fails_with, small_store
-from small_run import block
 
 import mc_engine.runner
 from mc_engine.errors import ModelError, RunInterrupted, StoreError
 from mc_engine.store.opening import open_store
 from mc_engine.store.verification import damage
+from tests.mc_engine.store.small_run import block
 
 
 @pytest.fixture

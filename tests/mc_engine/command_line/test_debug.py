@@ -5,11 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-from mistaken_campaign import line_of, write_campaign
-from small_run import ENVIRONMENT
-
 import mc_engine
 from tests.mc_engine.flight.falling_ball import python_campaign
+from tests.mc_engine.model.mistaken_campaign import line_of, write_campaign
+from tests.mc_engine.store.small_run import ENVIRONMENT
 
 PAGE = Path(mc_engine.__file__).parent / "documentation" / "how_to" / "looking_inside.md"
 BELOW = "    g = -MU_EARTH"

@@ -9,8 +9,9 @@ import time
 from contextlib import contextmanager
 
 import pytest
-from mistaken_campaign import write_campaign
-from small_run import ENVIRONMENT
+
+from tests.mc_engine.model.mistaken_campaign import write_campaign
+from tests.mc_engine.store.small_run import ENVIRONMENT
 
 PATIENCE_S = 120.0
 

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_run import ENVIRONMENT
 
 import mc_engine
 from mc_engine.campaign.search import SHIPPED
@@ -24,6 +23,7 @@ from mc_engine.flight.flight import fly
 from mc_engine.lanes import kernel_cache
 from mc_engine.model import load_model
 from tests.faults.falling import MODEL as FALL
+from tests.mc_engine.store.small_run import ENVIRONMENT
 
 
 def fall(factor):

@@ -6,7 +6,6 @@ import sys
 import time
 
 import pytest
-from small_run import ENVIRONMENT
 from test_kernel import fall, speed
 
 import mc_engine
@@ -16,6 +15,7 @@ from mc_engine.flight.kernel_key import Recorder, kernel_key
 from mc_engine.flight.kernel_parts import parts_of
 from mc_engine.lanes import kernel_cache
 from mc_engine.model import load_model
+from tests.mc_engine.store.small_run import ENVIRONMENT
 
 
 def edited(*edits, text=None):

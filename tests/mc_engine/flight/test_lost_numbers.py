@@ -9,8 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mistaken_campaign import campaign_with, with_evaluate
-from small_run import ENVIRONMENT
 
 import mc_engine
 from mc_engine.campaign.cases import case_table, full_inputs
@@ -23,6 +21,8 @@ from mc_engine.flight.interpreted import InterpretedFlight
 from mc_engine.flight.lost_numbers import first_lost
 from mc_engine.runner import runner
 from mc_engine.status import STATUS_NAME
+from tests.mc_engine.model.mistaken_campaign import campaign_with, with_evaluate
+from tests.mc_engine.store.small_run import ENVIRONMENT
 
 ROCKET = Path(mc_engine.__file__).parent / "documentation" / "tutorial" / "sounding_rocket"
 DRAG = "    drag = 0.5 * rho * m.drag_area * sqrt(ux * ux + uz * uz)\n"

@@ -1,23 +1,25 @@
 """Deliberate mistakes in the smallest model: each gets one sentence with its place, none a compiler's page."""
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
 
+import numpy as np
 import pytest
-from mistaken_campaign import campaign_with, given, in_front, line_of, with_evaluate
-from small_run import ENVIRONMENT
 
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.campaign.search import list_campaigns
 from mc_engine.errors import CampaignError
-from mc_engine.flight import contract_flight
+from mc_engine.flight import contract_flight, repeatability
 from mc_engine.flight.contract import breaches
 from mc_engine.flight.contract_flight import _nominal_reach, faults
 from mc_engine.flight.flight import fly
 from mc_engine.flight.interpreted import InterpretedFlight
 from mc_engine.flight.kernel_parts import watching_events
+from tests.mc_engine.model.mistaken_campaign import campaign_with, given, in_front, line_of, with_evaluate
+from tests.mc_engine.store.small_run import ENVIRONMENT
 
 
 def only(sentences):
@@ -94,6 +96,50 @@ def test_a_mistake_that_shows_in_flight_is_one_sentence(mistake, tmp_path):
     assert sentence in only(faults(campaign))
 
 
+CLOCK = "FixedStep(step=10.0, until=10_000.0)"
+STOP = 'events={"apogee": Event(climb, "falling", "stop")}'
+
+
+@pytest.mark.parametrize(
+    ("step", "until", "ends", "fit"),
+    [
+        (
+            30.0,
+            20_000.0,
+            "20010 s, after 667 steps",
+            "an `until` of 19980 s or 20010 s, or steps of 29.9850074962519 s",
+        ),
+        (700.0, 300.0, "700 s, after 1 steps", "an `until` of 700 s, or steps of 300 s"),
+    ],
+)
+def test_an_end_inside_a_step_is_named_and_what_is_suggested_fits(tmp_path, step, until, ends, fit):
+    def checked(step, until):
+        return faults(campaign_with(tmp_path, (CLOCK, f"FixedStep({step}, {until})"), (STOP, "")))
+
+    sentence = only(checked(step, until))
+    assert f"`until` is {until:g} s, and flights end at {ends} of {step:g} s; take {fit}" in sentence
+    *others, shorter = re.findall(r"[\d.]+", fit)
+    assert [checked(step, other) for other in others] == [[]] * len(others)
+    assert checked(shorter, until) == []
+
+
+@pytest.mark.parametrize(("method", "limit_s"), [("gj9", 105.0), ("abm12", 70.0)])
+def test_steps_beyond_the_limit_of_stability_are_found_though_every_case_is_ok(tmp_path, method, limit_s):
+    def checked(step):
+        rates = ', rates=(("x", "vx"), ("y", "vy"))' if method == "gj9" else ""
+        clock = f'FixedStep({step}, {step * 800}, method="{method}"{rates})'
+        campaign = campaign_with(tmp_path, (CLOCK, clock), (STOP, ""))
+        flown = fly(campaign.model, campaign.nominal, np.array([0]), 1, folder=tmp_path)
+        assert flown["status"][0] == "ok"
+        return faults(campaign)
+
+    assert checked(0.9 * limit_s) == []
+    for beyond in (1.3, 5.0):  # where half of the step is stable, and where it is not
+        sentence = only(checked(beyond * limit_s))
+        assert f'steps of {beyond * limit_s:g} s are too long for "{method}"' in sentence
+        assert "with half of the step" in sentence
+
+
 def test_a_switching_event_that_never_fires_is_missed_unless_it_is_declared_rare(tmp_path):
     edits = [
         in_front("@physics\ndef moon(s):\n    return s.x - 3.8e8"),
@@ -128,7 +174,8 @@ def test_a_right_model_is_checked_with_the_kernel_of_its_run_alone(tmp_path, mon
         flown.append(model)
         return fly(model, *arguments, **options)
 
-    monkeypatch.setattr(contract_flight, "fly", noted)
+    for module in (contract_flight, repeatability):
+        monkeypatch.setattr(module, "fly", noted)
     assert faults(campaign) == []
     assert flown
     assert not any(model.watching for model in flown)

@@ -116,13 +116,13 @@ def test_a_batch_with_more_rows_than_memory_flies_in_pieces(monkeypatch):
     inputs = {"gate_s": 0.0005, "gate_every_s": np.array([1.0, 0.05, 0.007, 1.0, 0.01]), "v0_m_s": 1.0}
     expected = histories_of(RAIL, **inputs)
     monkeypatch.setattr(flight, "_MOST_NUMBERS", 500)  # the rows of no two cases
-    fly, together = flight._Recorder._fly, []
+    fly, together = flight._Recorder._fly_once, []
 
     def counted(recorder, chosen, *how):
         together.append(chosen.size)
         return fly(recorder, chosen, *how)
 
-    monkeypatch.setattr(flight._Recorder, "_fly", counted)
+    monkeypatch.setattr(flight._Recorder, "_fly_once", counted)
     for history, other in zip(histories_of(RAIL, **inputs), expected, strict=True):
         same_bytes(history, other)
     assert together[0] == 5

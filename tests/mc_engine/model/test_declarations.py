@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from mistaken_campaign import campaign_with, refused
+from mistaken_campaign import campaign_with, refused, with_input
 
 from mc_engine.errors import ModelError
 from mc_engine.flight.contract import breaches
 from mc_engine.flight.flight import fly, fly_interpreted
 from mc_engine.flight.interpreted import InterpretedFlight
-from mc_engine.model import Field, Parameter, Setting, inputs, maximum_of, metrics, outputs, states
-from mc_engine.model.declarations import unit_of
+from mc_engine.model import Field, Parameter, Setting, choices, inputs, maximum_of, metrics, outputs, states
+from mc_engine.units import unit_of
 
 
 def test_one_declaration_makes_the_tuple_and_the_columns():
@@ -124,6 +124,22 @@ def test_evaluate_gives_the_metrics_that_the_engine_does_not_compute(tmp_path):
     (found,) = breaches(campaign_with(tmp_path / "lost", edits[0], without, edits[2]))
     assert "`evaluate` gives " in found
     assert 'it must give a record with "slow"' in found
+
+
+def test_choices_are_the_numbers_that_physics_has_for_the_words_of_settings(tmp_path):
+    made = inputs(law=Setting("b", "law", choices=("a", "b")), air=Setting("no", "air", choices=("no", "thin", "b")),
+                  drag=Setting(False, "drag"), step_s=Setting(1.0, "step"))  # fmt: skip
+    assert vars(choices(made)).keys() == {"law", "air"}
+    assert vars(choices(made).air) == {"no": 0.0, "thin": 1.0, "b": 2.0}
+    edits = (
+        *with_input('law=Setting("weak", "law", choices=("plain", "weak"))'),
+        ("import Event", "import choices, Event"),
+        ("State = states(", "CHOICES = choices(Inputs)\nState = states("),
+        ("def rhs(s)", "def rhs(s, o)"),
+        ("g = -MU", "g = -(0.99 if o.law == CHOICES.law.weak else 1.0) * MU"),
+    )
+    of_word, weak = flown(tmp_path / "word", *edits), flown(tmp_path / "weak", ("g = -MU", "g = -0.99 * MU"))
+    assert all(np.array_equal(of_word[name], weak[name]) for name in weak)
 
 
 def test_a_memory_starts_with_its_defaults_and_is_given_by_keyword(tmp_path):

@@ -12,10 +12,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from small_run import ENVIRONMENT
 
 from mc_engine.campaign.search import SHIPPED
 from mc_engine.model import designs, kept_design, load_model
+from tests.mc_engine.store.small_run import ENVIRONMENT
 
 INPUTS = np.array([1.0, np.nan, 3.0])
 Pair = namedtuple("Pair", "a b")

@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from small_run import ENVIRONMENT
 
 from mc_engine.errors import ModelError
 from mc_engine.model import Event, Field, Parameter, load_model
+from tests.mc_engine.store.small_run import ENVIRONMENT
 
 WAVE_FOLDER = Path(__file__).resolve().parents[1] / "lanes" / "models"
 WAVE = load_model("wave.py", WAVE_FOLDER)

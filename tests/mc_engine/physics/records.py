@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from mc_engine.lanes.compiler import STRICT
-from mc_engine.lanes.tuples import joined, load_fields, store_fields
+from mc_engine.lanes.tuples import joined, load_fields, spread, store_fields
 
 
 @cache
@@ -14,12 +14,14 @@ def _kernel(function, record, width, several):
     @njit(**STRICT)
     def of_one(rows, out):
         for first in range(0, rows.shape[1], width):
-            store_fields(out, first, function(load_fields(record, rows, first, width)))
+            fields = load_fields(record, rows, first, width)
+            store_fields(out, first, spread(function(fields), fields[0]))
 
     @njit(**STRICT)
     def of_several(rows, out):
         for first in range(0, rows.shape[1], width):
-            store_fields(out, first, joined(*function(load_fields(record, rows, first, width))))
+            fields = load_fields(record, rows, first, width)
+            store_fields(out, first, spread(joined(*function(fields)), fields[0]))
 
     return of_several if several else of_one
 

@@ -273,3 +273,16 @@ def test_the_longest_unit_at_the_end_of_a_name_counts(name, factor):
     assert si_factor(name) == factor
     with pytest.raises(ModelError, match="did you mean"):
         si_factor(name, "m/ss")
+
+
+def test_a_column_whose_unit_is_not_known_is_no_plain_number(folder):
+    for name, sentence in [
+        ("thrust_kN", 'did you mean "thrust_kn"'),
+        ("thrust_lbf", '"thrust_lbf" ends in no unit'),
+        ("F [N]", '"F \\[N\\]" ends in no unit'),
+        ("rate_1_km", '"rate_1_km" may end in the unit 1/km or km'),
+    ]:
+        (folder / "points.csv").write_text(f"time_s,{name}\n0,1\n1,2\n")
+        with pytest.raises(ModelError, match=f"points.csv: .*{sentence}"):
+            curve("points.csv", x="time_s", y=name)
+        assert curve("points.csv", x="time_s", y=name, y_unit="kN")(1.0) == 2000.0

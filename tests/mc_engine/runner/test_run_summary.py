@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cart import small_store
 
 from mc_engine.runner.summary import (
     failed_cases,
@@ -16,6 +15,7 @@ from mc_engine.runner.summary import (
 )
 from mc_engine.statistics import summarize
 from mc_engine.status import OK, STATUS_NAME
+from tests.mc_engine.command_line.cart import small_store
 
 
 def test_numbers_of_a_verdict_count_failed_cases_as_not_inside(tmp_path):

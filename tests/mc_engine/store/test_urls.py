@@ -1,13 +1,13 @@
 """URLs of object stores: what is incomplete is refused before anything is flown, and nothing secret is said."""
 
 import pytest
-from cart import call
 from small_run import created, filled
 
 from mc_engine import load_campaign
 from mc_engine.errors import CampaignError, EngineError
 from mc_engine.store.object_store import Publisher, fetch, publish
 from mc_engine.store.urls import is_url, store_url
+from tests.mc_engine.command_line.cart import call
 
 pytest.importorskip("fsspec")
 

@@ -6,7 +6,6 @@ import sys
 import time
 
 import pytest
-from apogee_tuning import apogee_campaign
 from small_run import block
 
 from mc_engine import load_campaign
@@ -17,6 +16,7 @@ from mc_engine.store.verification import damage
 from mc_engine.store.writer_lock import WriterLock, described, holder, writer_of_new
 from mc_engine.studies.rare_event import estimate_rare_event
 from mc_engine.studies.tuning import tune
+from tests.mc_engine.studies.apogee_tuning import apogee_campaign
 
 
 def test_a_second_writer_is_refused_within_a_second_and_told_who_is_first(store):

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from cart import call
 from comparable_runs import TEXT, run
 
 from mc_engine.studies.comparison import compare_runs, pair_cases
 from mc_engine.studies.comparison_lines import comparison_lines
+from tests.mc_engine.command_line.cart import call
 
 
 def compared(a, b, **options):

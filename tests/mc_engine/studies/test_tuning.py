@@ -3,19 +3,18 @@
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from apogee_tuning import CHOICE, apogee_and_speed, apogee_campaign
-from cart import call, fails_with
 
 from mc_engine import open_tuning, tune
 from mc_engine.campaign.search import SHIPPED
 from mc_engine.errors import RunInterrupted
 from mc_engine.studies.tuning import Generation, dominated_shares, is_stalled
 from mc_engine.studies.tuning_folder import infeasibility
+from tests.mc_engine.command_line.cart import call, fails_with
 
 UNREACHABLE = '\n[tuning.constraint.high]\nmetric = "apogee_altitude_km"\nat_least = 5000.0\n'
 
@@ -109,10 +108,10 @@ def test_a_search_without_a_new_candidate_ends_there_and_keeps_what_it_has(tmp_p
 
 KILLED = """
 import os, signal, sys
-sys.path[:0] = {paths!r}
+sys.path.insert(0, {root!r})
 from pathlib import Path
-from apogee_tuning import apogee_campaign
 from mc_engine import tune
+from tests.mc_engine.studies.apogee_tuning import apogee_campaign
 
 def progress(done, total, failed):
     if done >= 36:
@@ -123,8 +122,8 @@ tune(apogee_campaign(), Path({out!r}), seed=1, workers=1, progress=progress)
 
 
 def test_a_killed_search_leaves_the_generations_that_were_flown(tmp_path):
-    paths, out = [str(Path(__file__).parents[1]), str(SHIPPED.parent)], tmp_path / "out"
-    killed = subprocess.run([sys.executable, "-c", KILLED.format(paths=paths, out=str(out))], check=False)
+    out = tmp_path / "out"
+    killed = subprocess.run([sys.executable, "-c", KILLED.format(root=str(SHIPPED.parent), out=str(out))], check=False)
     assert killed.returncode == -signal.SIGKILL
     record = open_tuning(out)
     assert record.manifest["tuning"]["end"] == "not ended"

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +12,14 @@ import mc_engine
 from mc_engine import open_store
 from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
 from reports.contents import build
-from reports.contributors.companion import companion_blocks
+from reports.contributors.companion import companion_blocks, sigma_contribution
 from reports.document.blocks import Table, blocks_of
 from reports.formats.json_data import render_json
 from reports.formats.markdown import render_markdown
 from reports.run.contributions import Contributions, Contributor
 from reports.run.flown import Flown
 
-MODEL = Path(__file__).parents[2] / "mc_engine" / "contributions" / "model.py"
+MODEL = Path(__file__).parents[2] / "mc_engine" / "runner" / "contributions" / "model.py"
 HEAD = '[campaign]\nmodel = "model.py"\ncases = 60\ndesign = "mc"\nseed = 3\n[sensitivity]\ncases = 256\n'
 INPUTS = "".join(
     f'[dispersion.{name}]\ndist = "uniform"\nlower = 0.0\nupper = 1.0\n' for name in ("x1", "x2", "x3", "x4")
@@ -75,6 +76,24 @@ def test_the_note_bounds_the_columns_that_are_bounded_and_no_others():
     assert values["Variance reduction at nominal"] == -0.25
     assert "First-order and total effects and their intervals are within 0 to 1." in table.note
     assert "Effects and intervals are" not in table.note
+
+
+def test_a_first_order_effect_without_a_total_effect_is_chance():
+    """Of many inputs without any effect, one has a first-order effect whose interval excludes zero."""
+    sure = Contributor("propellant_kg", "ve_pct", 1.0, 0.9, (0.9, 1.0), (0.8, 1.0))
+    chance = Contributor("propellant_kg", "oe_pct", 0.02, 0.0, (0.001, 0.04), (0.0, 0.002))
+    flown = Flown(synthetic_run(300), "run")
+    rows = {metric: () for metric in flown.key_metrics} | {"propellant_kg": (sure, chance)}
+    found = Contributions(rows, 768, dict.fromkeys(rows, 128), 128, {})
+    table = next(block for block in companion_blocks(flown, found) if isinstance(block, Table))
+    assert [row[1].text for row in table.rows] == ["ve"]
+    assert sigma_contribution(sure, 2.0) == 2.0
+    assert sigma_contribution(chance, 2.0) is None
+    assert "a first-order effect larger than its total effect" in table.note
+    rows["propellant_kg"] = (replace(sure, total=1.0), replace(sure, input="oe_pct", first=0.2, total=0.2))
+    table = next(block for block in companion_blocks(flown, found) if isinstance(block, Table))
+    assert "larger than its total effect" not in table.note
+    assert table.rows[0][0].small.endswith("above σ by chance in the estimates")
 
 
 def test_an_input_that_names_a_draw_is_said_so_in_the_manifest_and_has_no_share_without_flights(tmp_path):

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from synthetic_run import synthetic_run
 
+from mc_engine.runner.summary import verdict_line
 from reports.contents import build
 from reports.run.flown import Flown
-from reports.sections.headline import verdict_cards, warnings
+from reports.sections.headline import cost_cards, verdict_cards, warnings
 from reports.sections.requirement_tables import margin_block, requirement_table, risk_table
 from reports.sections.tables import quantile_table
 
@@ -84,7 +85,15 @@ def test_two_limits_show_the_interval_and_its_margin():
     assert 0.0 <= low < high < 2.5
     margin, share = (float(word) for word in row[3].replace(" %)", "").split(" kg ("))
     assert margin == pytest.approx(min(2.5 - high, low + 1.0), abs=1e-3)
-    assert share == pytest.approx(100.0 * margin / 3.5, abs=0.1)
+    assert share == pytest.approx(100.0 * margin / 1.75, abs=0.1)
+
+
+@pytest.mark.parametrize("lowest", [None, -1.0])
+def test_a_key_result_is_what_the_matrix_says_is_demonstrated(lowest):
+    band = flown(2000, campaign=mc(2000), requirements=[{**FUEL, "at_least": lowest}])
+    demonstrated = requirement_table(band).rows[0][2].text
+    card = next(card for card in cost_cards(band) if card.label == "propellant")
+    assert f"{demonstrated} in 99.73\u202f% of cases, 90\u202f% confidence" in card.answer
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 40])
@@ -124,6 +133,7 @@ def test_the_joint_card_names_the_requirement_that_fails_it():
     card = verdict_cards(found)[-1]
     assert (card.label, card.answer) == ("all at once", "fail")
     assert card.detail.endswith("inside; fuel fails with confidence shared.")
+    assert verdict_line(found.joint, {}).endswith("confidence); fuel fails with confidence shared")
 
 
 def test_margins_of_a_limit_of_zero_have_no_width():

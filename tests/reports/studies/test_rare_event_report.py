@@ -11,7 +11,7 @@ import reports
 from mc_engine.store.parts import Column
 from mc_engine.store.result_folder import write_result
 from mc_engine.store.run_files import RARE_EVENT
-from mc_engine.studies.rare_event_folder import open_rare_event
+from mc_engine.studies.rare_event_folder import open_rare_event, rare_event_lines
 from reports.document.blocks import FigureBlock, Table, blocks_of
 from reports.drawing import screen
 from reports.studies.rare_events import build_rare_event
@@ -132,3 +132,10 @@ def test_failed_cases_are_a_scatter_of_the_two_inputs_they_lie_farthest_in(tmp_p
     np.testing.assert_array_equal(failed.y, cases["c"][700:])
     assert (ordinary.x.size, likeliest.x[0], likeliest.y[0]) == (500, -5.0, 3.0)
     assert classes(figure.drawing) == {"drawn from the dispersions, not failed": 500, "failed": 300}
+
+
+def test_command_line_and_report_round_the_accepted_fraction_alike(tmp_path):
+    record = estimated(tmp_path / "out", levels=[{**level(None, 1.0), "accepted": 0.568}])
+    (table,) = [one for one in blocks_of(build_rare_event(record, "out"), Table) if one.caption == "Levels"]
+    assert table.rows[0][-1].text == "57\u202f%"
+    assert any(line.endswith("57 %") for line in rare_event_lines(record.result))

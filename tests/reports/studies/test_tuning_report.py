@@ -1,6 +1,7 @@
 """The report of a tuning: front, published points, and a plain word where nothing is feasible."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from figure_marks import drawings, marks_of
 from synthetic_tuning import synthetic_tuning
 
 import reports
-from mc_engine.studies.tuning_folder import UNFINISHED
+from mc_engine.studies.tuning_folder import UNFINISHED, tuning_lines
 from reports.document.blocks import FigureBlock, Table, blocks_of
 from reports.drawing import paper, screen
 from reports.drawing.marks import Points
@@ -90,7 +91,7 @@ def test_infeasibility_is_stated_with_the_least_violation_and_never_hidden(infea
 def test_a_feasible_search_has_no_such_warning(document):
     assert document.warnings == ()
     assert document.verdicts[0].answer == "within reach"
-    assert "not beaten by any other" in document.subtitle
+    assert "beaten by no other" in document.subtitle
 
 
 def test_three_objectives_have_a_panel_for_each_pair(tmp_path):
@@ -129,3 +130,13 @@ def test_both_renderers_take_it_and_give_the_same_bytes_twice(document, infeasib
 def test_reports_of_a_tuning_are_written_beside_its_tables(record):
     assert [path.name for path in reports.write_reports(record.path)] == ["report.html", "report.pdf"]
     assert (record.path / "report.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_a_search_without_constraints_does_not_claim_limits_and_names_the_requirements_left_out(record):
+    assert build_tuning(record, "out").subtitle.endswith("inside all constraints and beaten by no other.")
+    free = {**record.manifest, "tuning": {**record.manifest["tuning"], "constraints": []},
+            "requirements": [{"name": "soft", "metric": "speed_m_s"}]}  # fmt: skip
+    made = build_tuning(replace(record, manifest=free), "out")
+    assert made.subtitle.endswith("beaten by no other; the search has no constraint.")
+    assert any("fail them" in warning and warning.endswith("requirements soft.") for warning in made.warnings)
+    assert any("requirements soft" in line for line in tuning_lines(replace(record, manifest=free)))

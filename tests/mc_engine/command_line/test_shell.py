@@ -7,10 +7,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from small_run import ENVIRONMENT
 
 from mc_engine.store.opening import open_store
 from mc_engine.store.verification import damage
+from tests.mc_engine.store.small_run import ENVIRONMENT
 
 
 @pytest.mark.parametrize(

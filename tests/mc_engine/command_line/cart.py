@@ -1,10 +1,10 @@
 """A campaign of a cart, and the command line called inside a test."""
 
-from small_run import COLUMNS, MANIFEST, TEXT, filled
 from typer.testing import CliRunner
 
 from mc_engine.command_line.commands import app
 from mc_engine.store.store import create_store
+from tests.mc_engine.store.small_run import COLUMNS, MANIFEST, TEXT, filled
 
 MODEL = """
 from mc_engine.model import FixedStep, Parameter, Setting, inputs, metrics, model, outputs, states

@@ -1,12 +1,12 @@
 """Run directories that differ in a chosen way, for the tests of comparisons."""
 
 import numpy as np
-from cart import REQUIREMENT
 from scipy.stats import norm
 
 from mc_engine.sampling.streams import uniforms
 from mc_engine.status import NO_STOP, OK
 from mc_engine.store.store import Column, Store, create_store
+from tests.mc_engine.command_line.cart import REQUIREMENT
 
 COLUMNS = [
     Column("ve_pct", "%", "dispersion", "error of the burn"),

@@ -3,7 +3,8 @@ import sys
 
 import pytest
 from cart import small_store
-from small_run import ENVIRONMENT
+
+from tests.mc_engine.store.small_run import ENVIRONMENT
 
 
 def loaded_by(*arguments):

@@ -7,11 +7,11 @@ import sys
 
 import pytest
 from cart import call
-from small_run import ENVIRONMENT, created, filled
 
 from mc_engine.command_line import commands as cli
 from mc_engine.documentation.commands_page import commands
 from mc_engine.documentation.website import HOME
+from tests.mc_engine.store.small_run import ENVIRONMENT, created, filled
 
 MARK = "import pathlib; pathlib.Path({!r}).touch()\n"
 NEVER = {

@@ -1,11 +1,11 @@
 """More cases than a run can have are refused as a slip of the user's, before anything is written."""
 
 import pytest
-from cart import call, fails_with
 
 from mc_engine.errors import CampaignError
 from mc_engine.runner import runner
 from mc_engine.status import MOST_CASES
+from tests.mc_engine.command_line.cart import call, fails_with
 
 LIMIT = f"{MOST_CASES + 1} is not allowed; it must be at most {MOST_CASES}"
 

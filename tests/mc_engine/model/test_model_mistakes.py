@@ -5,7 +5,6 @@ import re
 import numpy as np
 import pytest
 from mistaken_campaign import campaign_with, given, in_front, line_of, with_evaluate, with_input, write_campaign
-from told import told
 
 from mc_engine.errors import ModelError
 from mc_engine.flight import flight
@@ -14,6 +13,7 @@ from mc_engine.flight.contract_flight import faults
 from mc_engine.lanes import any_lane, where
 from mc_engine.model.faults import MORE
 from mc_engine.runner.runner import run
+from tests.mc_engine.told import told
 
 ACCELERATION = "    g = -MU_EARTH / (r2 * sqrt(r2))\n"
 DERIVATIVE = "    return State(x=s.vx, y=s.vy, vx=g * s.x, vy=g * s.y)"
@@ -110,7 +110,8 @@ LINES = [
     ("g = Foo(g).x", "make it a namedtuple", "class Foo:\n    def __init__(self, x):\n        self.x = x"),
     ("g = g * EARTH.mu", "`Planet` is not for physics",
      "from dataclasses import dataclass\n@dataclass\nclass Planet:\n    mu: float\nEARTH = Planet(1.0)"),
-    ('g = 2.0 * g if o.law == "b" else g', "a setting is a number, not a text: the index in its `choices`"),
+    ('g = 2.0 * g if o.law == "b" else g',
+     "a setting is a number, not a text; CHOICES = choices(Inputs) has it as CHOICES.law.word"),
     ('g = 2.0 * g if o.law in ("a", "b") else g', "a setting is a number, not a text"),
     # numbers that differ from case to case
     (f"a = Many(f0=g if o.law > 0.5 else t, {', '.join(f'{name}=g' for name in FIELDS[1:])})",

@@ -5,8 +5,6 @@ import subprocess
 import sys
 
 import pytest
-from cart import call
-from small_run import ENVIRONMENT
 
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.campaign.search import SHIPPED
@@ -15,6 +13,8 @@ from mc_engine.flight.kernel import source_digest
 from mc_engine.runner.flown_campaign import companions_of
 from mc_engine.runner.runner import extend, replay, run
 from mc_engine.store.verification import damage
+from tests.mc_engine.command_line.cart import call
+from tests.mc_engine.store.small_run import ENVIRONMENT
 
 MODEL = (SHIPPED / "minimal" / "model.py").read_text()
 CAMPAIGN = (SHIPPED / "minimal" / "campaign.toml").read_text()

@@ -8,9 +8,8 @@ import numpy as np
 from mc_engine.status import NO_STOP, OK
 from mc_engine.store.store import Column, create_store
 
-_HERE = Path(__file__).resolve().parent
-# For processes that a test starts: they find the engine and this module from any working folder.
-ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join([str(_HERE.parents[1]), str(_HERE)])}
+# For processes that a test starts: they find the engine and the tests from any working folder.
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[3])}
 
 COLUMNS = [
     Column("ve_pct", "%", "dispersion", "error of the speed change"),

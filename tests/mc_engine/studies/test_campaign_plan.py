@@ -1,9 +1,9 @@
 """What a campaign's requirements take."""
 
 import pytest
-from toy import load
 
 from mc_engine.studies.plan import plan_lines
+from tests.mc_engine.campaign.toy import load
 
 RANGE = '[requirement.range]\nmetric = "range_m"\nat_least = 1.0\nshare = 0.9973\nconfidence = 0.9\n'
 FUEL = '[requirement.fuel]\nmetric = "propellant_kg"\nat_most = 1.0\nshare = 0.95\nconfidence = 0.95\n'

@@ -3,11 +3,11 @@
 import json
 
 import pytest
-from cart import call
 from small_run import block
 
 from mc_engine.store import parts
 from mc_engine.store.verification import RESUME, damage
+from tests.mc_engine.command_line.cart import call
 
 STRAY = "cases/part-0000000010-0000000019.parquet"
 
