@@ -37,6 +37,7 @@ _NUMBERS: dict[str, Any] = {"float64": ctypes.c_double, "int64": ctypes.c_int64,
 _OF_PYTHON = {float: "float64", int: "int64"}
 _ARRAYS = {1: "[]", 2: "[,]"}
 _DIGEST_BYTES = 32
+_IDLE_NAMES = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")  # of numba's settings; they change no code of a kernel
 ENDED_WITH_ERROR = (
     "the compiled physics ended with an error; physics computes numbers and raises nothing. "
     "`mc-engine debug FILE --case N` flies a case line by line"
@@ -166,7 +167,8 @@ def _target() -> tuple[Any, ...]:
     """What machine code is made for, besides the versions in the kernel's own name: the processor and its
     instructions, and what the environment and a file in the working folder ask of numba."""
     features = sorted(name for name, has in binding.get_host_cpu_features().items() if has)
-    asked: list[tuple[str, Any]] = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_"))
+    names = sorted(name for name in os.environ if name.startswith("NUMBA_") and name not in _IDLE_NAMES)
+    asked: list[tuple[str, Any]] = [(name, os.environ[name]) for name in names]
     file = Path(".numba_config.yaml")
     asked += [(file.name, file.read_bytes())] if file.is_file() else []
     return binding.get_process_triple(), binding.get_host_cpu_name(), features, asked

@@ -90,6 +90,8 @@ def fault_of_trial(error: Exception) -> str:
 def _hint_of_field(error: Exception, record: str, field: str) -> str:
     frame, _ = frame_in_model(error)
     made = (frame.f_globals | frame.f_locals).get(record) if frame else None
+    if field in [item.symbol for item in getattr(made, "declared", ()) if item.name in getattr(made, "computed", ())]:
+        return "; the engine computes it as it is declared: leave it out here"
     return hint(field, getattr(made, "_fields", ()))
 
 

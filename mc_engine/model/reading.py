@@ -136,19 +136,19 @@ def _parts(function: Any) -> Iterator[Any]:
 
 def _wrong_functions(model: Model) -> Iterator[str]:
     for name, function in functions_of_model(model):
-        wanted = ARGUMENTS[name]
+        wanted, called = ARGUMENTS[name], getattr(code_of(function), "co_name", name)
         if not callable(function):
             yield f"`{name}` is {function!r}; it must be a function"
             continue
         if name not in INTERPRETED:  # it is handed the arguments that it names
             if not isinstance(function, PhysicsFunction):
-                yield f"{place_of(function)}: `{name}` is not marked; write @physics on the line above it"
+                yield f"{place_of(function)}: `{called}` is not marked; write @physics on the line above it"
             continue
         try:
             inspect.signature(function).bind(*wanted.split(", "))
         except TypeError:
             given = ", ".join(inspect.signature(function).parameters) or "nothing"
-            yield f"{place_of(function)}: `{name}` takes ({given}); the engine gives it ({wanted})"
+            yield f"{place_of(function)}: `{called}` takes ({given}); the engine gives it ({wanted})"
 
 
 class _Reader:

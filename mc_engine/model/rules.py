@@ -80,6 +80,7 @@ def _refuse_false_numbers(system: "System") -> None:
     _refuse_half_letters(system)
     for item in numbers:
         _refuse_name(item)
+        _refuse_swapped(item)
     names, outputs = [item.name for item in (*inputs, *system.metrics)], [item.name for item in system.quantities]
     columns = [*names, *(f"end_{state.name}" for state in system.states)]
     _refuse_taken("column", names, _CASE_COLUMNS)
@@ -114,6 +115,13 @@ def _refuse_name(item: Named) -> None:
         raise ModelError(f'"{item.name}" has the unit "{item.unit}", so that its name must end in "{suffix}"; '
                          "change the name or the unit")  # fmt: skip
     _refuse_word("name", item.symbol)
+
+
+def _refuse_swapped(item: Named) -> None:
+    """ModelError for limits that no number keeps."""
+    low, high = getattr(item, "low", -inf), getattr(item, "high", inf)
+    if low > high:
+        raise ModelError(f'"{item.name}" has low={low:g}, which is above high={high:g}; swap them')
 
 
 def _refuse_choice(setting: Setting) -> None:
@@ -154,7 +162,8 @@ def _refuse_unknown(what: str, word: Any, known: Iterable[str]) -> None:
 def _refuse_clock(clock: FixedStep | AdaptiveStep, settings: list[str], states: list[str]) -> None:
     """ModelError for numbers by which nothing can fly.  settings, states : symbols that a clock may name."""
     kind = type(clock).__name__
-    _refuse_unknown("the clock has the method", clock.method, METHODS[kind])
+    if clock.method not in METHODS[kind]:
+        raise ModelError(f'the clock has the method "{clock.method}"; {kind} has {listed(METHODS[kind])}')
     _refuse_time("until", clock.until, settings)
     if isinstance(clock, FixedStep):
         _refuse_time("step", clock.step, settings)
@@ -181,12 +190,13 @@ def _refuse_rates(clock: FixedStep, states: list[str]) -> None:
     named = [name for pair in clock.rates for name in pair]
     for name in named:
         _refuse_unknown("the clock's `rates` have the state", name, states)
-    if sorted(named) != sorted(states):
-        raise ModelError(
-            f'the clock\'s `rates` name {listed(named) or "no state"}; the method "{clock.method}" needs each of the '
-            f'states {listed(states)} in one pair, such as ("x", "vx") where vx is the derivative of x; '
-            '"abm11" is for any states'
-        )
+    if sorted(named) == sorted(states):
+        return
+    each = f'each of the states {listed(states)} in one pair, such as ("x", "vx") where vx is the derivative of x'
+    fix = f'the method "{clock.method}" needs {each}; "abm11" is for any states'
+    if not uses_rates(clock):
+        fix = f'the method "{clock.method}" does not use them: leave `rates` out, or name {each}'
+    raise ModelError(f"the clock's `rates` name {listed(named) or 'no state'}; {fix}")
 
 
 def _refuse_time(name: str, value: Any, settings: list[str], least: float | None = None, most: float = 1e300) -> None:

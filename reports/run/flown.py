@@ -18,6 +18,7 @@ from reports.run.contributions import Contributions
 from reports.run.contributions import contributions as contributions_of
 from reports.text.numbers import axis_label, count, named, same_lengths, words
 
+URGENCY = ("fail", "not demonstrable", "pass")  # of verdicts, the first to be looked at first
 NEGLIGIBLE = 1e-7  # of the size of a metric
 SQUARABLE = 1e140  # largest number, and inverse of the smallest spread, whose squares over all cases can be summed
 NEGLIGIBLE_SPREAD = "standard deviation below a ten-millionth of the value"
@@ -260,6 +261,16 @@ class Flown:
         known = [name for name in dict.fromkeys(wanted) if name in metrics]
         drawn = [name for name in known or metrics if not self.undrawn(name)]
         return drawn or [name for name in metrics if self.undrawn(name) != UNSQUARABLE]
+
+    @cached_property
+    def worst_first(self) -> list[str]:
+        """The metrics that matter and vary: those of failed requirements, of not demonstrable ones, the others."""
+        ranks: dict[str, int] = {}
+        for verdict in self.verdicts:
+            rank = URGENCY.index(verdict.outcome)
+            ranks[verdict.metric] = min(rank, ranks.get(verdict.metric, rank))
+        varying = [name for name in self.key_metrics if not self.summaries[name].constant]
+        return sorted(varying, key=lambda name: ranks.get(name, len(URGENCY)))
 
     def limits(self, metric: str) -> Limits:
         """The tightest limits that the requirements set on a metric."""

@@ -62,10 +62,9 @@ def input_words(flown: Flown, row: int) -> str:
 
 def worst_tables(flown: Flown) -> Iterator[Table]:
     """The worst cases of the metrics that matter, those of requirements not met first; then the first failed cases."""
-    passed = {verdict.metric: verdict.outcome == "pass" for verdict in flown.verdicts}
-    for metric in sorted(flown.key_metrics, key=lambda name: passed.get(name, True))[:WORST_METRICS]:
+    for metric in flown.worst_first[:WORST_METRICS]:
         cases = flown.worst(metric, WORST)
-        if len(cases) and not flown.summaries[metric].constant:
+        if len(cases):
             yield _case_table(flown, _worst_words(flown, metric), metric, cases)
     failed = flown.n_tried - flown.every.completed
     if failed:

@@ -296,7 +296,7 @@ def _worst_reasons(flown: Flown) -> dict[int, tuple[int, str]]:
     if flown.n_tried <= FEW_CASES:
         return {int(case): (row, input_words(flown, row)) for row, case in enumerate(flown.case_ids)}
     reasons: dict[int, tuple[int, str]] = {}
-    for order, metric in enumerate(name for name in flown.key_metrics if not flown.summaries[name].constant):
+    for order, metric in enumerate(flown.worst_first):
         one_sided = "largest" if flown.largest_is_worst(metric) else "smallest"
         which = "worst" if flown.limits(metric).two_sided else one_sided
         for place, case in enumerate(flown.worst(metric, WORST_RANKS)["case_id"], start=1):

@@ -7,7 +7,7 @@ from mc_engine.statistics import Summary, Verdict
 from mc_engine.statistics.worst import Limits
 from mc_engine.status import OK, STATUS_NAME
 from reports.document.blocks import Card
-from reports.run.flown import Flown
+from reports.run.flown import URGENCY, Flown
 from reports.sections.requirement_tables import demonstrated_text
 from reports.sections.tables import TONES, limit_text
 from reports.text.numbers import count, limit_number, number, percent, percentile, with_unit
@@ -17,8 +17,7 @@ MOST_COSTS = 4
 
 def verdict_cards(flown: Flown) -> tuple[Card, ...]:
     """One card per requirement, failed ones first."""
-    order = {"fail": 0, "not demonstrable": 1, "pass": 2}
-    verdicts = sorted(flown.verdicts, key=lambda verdict: order[verdict.outcome])
+    verdicts = sorted(flown.verdicts, key=lambda verdict: URGENCY.index(verdict.outcome))
     joint = [] if flown.joint is None else [flown.joint]
     return tuple(_verdict_card(flown, verdict) for verdict in [*verdicts, *joint])
 

@@ -54,6 +54,20 @@ def test_the_headline_of_a_two_sided_metric_names_both_ends_and_its_limits():
     assert "at most" not in card.answer
 
 
+def test_a_metric_that_fails_one_of_its_requirements_comes_before_one_that_passes_all():
+    run = two_sided()
+    run.table["other_m"] = np.arange(len(run.table), dtype=np.float64)
+    run.manifest["columns"].append({"name": "other_m", "unit": "m", "role": "metric", "description": "other"})
+    run.manifest["requirements"] = [
+        requirement("wide", "other_m", 1e6, -1e6),
+        requirement("tight", METRIC, 0.1, -0.1),
+        requirement("loose", METRIC, 1e6, -1e6),
+    ]
+    captions = [table.caption for table in blocks_of(build(run, "run"), Table)]
+    worst = [caption for caption in captions if caption.startswith("Cases with")]
+    assert ["correction impulse" in caption for caption in worst[:2]] == [True, False]
+
+
 def test_the_worst_cases_of_a_two_sided_metric_have_the_smallest_margin_and_its_strongest_inputs():
     run = two_sided()
     run.table.insert(3, "area_factor", np.random.default_rng(3).normal(size=len(run.table)))

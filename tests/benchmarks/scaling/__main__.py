@@ -56,7 +56,7 @@ def costs(large: dict[int, Flown], small: dict[int, Flown], stored: dict[int, St
     alone_parts, most_parts = alone.clocks.committed, most.clocks.committed
     small_shards, large_shards = (stored[chunk] for chunk in (SMALL_PART, LARGEST_CHUNK))
     published, checked, again, fetched, merged = large_shards.steps.values()
-    requests = {step: sum(taken.requests.values()) / small_shards.parts for step, taken in small_shards.steps.items()}
+    publishing, fetching = ("published", "checked in flight", "published again"), ("fetched",)
     cases = large_shards.parts * LARGEST_CHUNK
     whole = large[min(large)].clocks
     found = {
@@ -66,16 +66,22 @@ def costs(large: dict[int, Flown], small: dict[int, Flown], stored: dict[int, St
         "scheduler_ms": 1e3 * most.clocks.scheduler / most_parts,
         "start_s": large[min(large)].start_s,
         "case_bytes": large_shards.part_bytes / cases,
-        "publish_requests": requests["published"],
+        "publish_requests": small_shards.requests(publishing),
+        "publish_more_requests": more_requests(publishing, small_shards, large_shards),
         "publish_case_us": 1e6 * published.processor / cases,
         "check_case_us": 1e6 * checked.wall / cases,
-        "again_requests": requests["published again"],
         "again_case_us": 1e6 * again.processor / cases,
-        "fetch_requests": requests["fetched"],
+        "fetch_requests": small_shards.requests(fetching),
+        "fetch_more_requests": more_requests(fetching, small_shards, large_shards),
         "fetch_case_us": 1e6 * fetched.processor / cases,
         "merge_case_us": 1e6 * merged.wall / cases,
     }
     return Costs(**{name: float(f"{value:.3g}") for name, value in found.items()}, **ASSUMPTIONS)
+
+
+def more_requests(steps: tuple[str, ...], small: Stored, large: Stored) -> float:
+    """Requests that a part of some steps takes more for each 1000 cases that it is larger."""
+    return 1e3 * (large.requests(steps) - small.requests(steps)) / (LARGEST_CHUNK - SMALL_PART)
 
 
 def report(options: argparse.Namespace) -> str:

@@ -30,12 +30,13 @@ class Costs:
     scheduler_ms: float = _cost("processor time of the scheduler for a part", "ms")
     start_s: float = _cost("a worker loads the campaign", "s")
     case_bytes: float = _cost("a case in Parquet", "B")
-    publish_requests: float = _cost("requests to publish a part", "1")
+    publish_requests: float = _cost("requests to publish a small part, to check it and to publish it again", "1")
+    publish_more_requests: float = _cost("further requests of these for each 1000 cases of a part", "1")
     publish_case_us: float = _cost("processor time to publish a case", "µs")
     check_case_us: float = _cost("time to check a published case in flight", "µs")
-    again_requests: float = _cost("requests to publish a part again, which is there", "1")
     again_case_us: float = _cost("processor time to publish a case again, which is there", "µs")
-    fetch_requests: float = _cost("requests to fetch a part", "1")
+    fetch_requests: float = _cost("requests to fetch a small part", "1")
+    fetch_more_requests: float = _cost("further requests to fetch for each 1000 cases of a part", "1")
     fetch_case_us: float = _cost("processor time to fetch a case", "µs")
     merge_case_us: float = _cost("merging a case", "µs")
     node_cores: float = _cost("cores of a node, a worker each", "1", ASSUMED)
@@ -78,16 +79,22 @@ def as_shards(costs: Costs, cases: float, nodes: int) -> dict[str, float]:
 
 def _publishing_s(costs: Costs, cases: int, parts: int) -> float:
     """Every part is sent and read back, checked by the last copy in flight, and read back again by the command's."""
-    requests = 1e-3 * parts * (costs.publish_requests + costs.again_requests) * costs.request_ms
+    requests = 1e-3 * _requests(costs.publish_requests, costs.publish_more_requests, cases, parts) * costs.request_ms
     processor = 1e-6 * cases * (costs.publish_case_us + costs.check_case_us + costs.again_case_us)
     return requests + processor + 3.0 * 1e-9 * cases * costs.case_bytes / costs.link_gb_s
+
+
+def _requests(of_a_part: float, of_1000_cases: float, cases: float, parts: int) -> float:
+    """Requests for all parts: some for each, and more for larger ones, whose bytes go in several pieces."""
+    return parts * of_a_part + 1e-3 * cases * of_1000_cases
 
 
 def merging(costs: Costs, cases: float, nodes: int) -> dict[str, float]:
     """Seconds of one machine that fetches the shards, some at a time, and then merges them, by name."""
     shard_cases = ceil(cases / nodes)
     parts = nodes * ceil(shard_cases / chunk_size(shard_cases, int(costs.node_cores)))
-    one_by_one = 1e-3 * parts * costs.fetch_requests * costs.request_ms + 1e-6 * cases * costs.fetch_case_us
+    requests = _requests(costs.fetch_requests, costs.fetch_more_requests, cases, parts)
+    one_by_one = 1e-3 * requests * costs.request_ms + 1e-6 * cases * costs.fetch_case_us
     return {
         "fetching": max(one_by_one / costs.fetches, 1e-9 * cases * costs.case_bytes / costs.link_gb_s),
         "merging": 1e-6 * cases * costs.merge_case_us,

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,6 +93,10 @@ class Stored:
     parts: int
     part_bytes: int
     steps: dict[str, Step]
+
+    def requests(self, steps: Iterable[str]) -> float:
+        """Requests for a part of some steps together."""
+        return sum(self.steps[name].requests.total() for name in steps) / self.parts
 
 
 def shards_by_store(campaign: Campaign, folder: Path, chunk: int, shards: int = 2) -> Stored:

@@ -1,22 +1,25 @@
 """Short forms of the measurements on scaling, the model that goes on from them, and the tables of the page."""
 
+from collections import Counter
 from dataclasses import fields, replace
 
 import pytest
 
+from mc_engine.flight.chunks import LARGEST_CHUNK
 from mc_engine.runner import runner
 from tests.benchmarks.scaling import tables
 from tests.benchmarks.scaling.model import Costs, as_shards, longest, merging, most_workers, on_one_scheduler, runs_of
 
 pytest.importorskip("moto.server")
+from tests.benchmarks.scaling.__main__ import SMALL_PART, more_requests
 from tests.benchmarks.scaling.cluster import cluster_of, fly, plain, recovery
-from tests.benchmarks.scaling.storage import s3_server, shards_by_store
+from tests.benchmarks.scaling.storage import Step, Stored, s3_server, shards_by_store
 
 CASES, CHUNK = 960, 16
 COSTS = Costs(
     case_us=1000.0, part_idle_ms=10.0, writer_ms=5.0, scheduler_ms=2.0, start_s=3.0, case_bytes=200.0,
-    publish_requests=5.0, publish_case_us=4.0, check_case_us=1.0, again_requests=2.0, again_case_us=3.0,
-    fetch_requests=2.0, fetch_case_us=2.0, merge_case_us=10.0,
+    publish_requests=7.0, publish_more_requests=0.5, publish_case_us=4.0, check_case_us=1.0, again_case_us=3.0,
+    fetch_requests=2.0, fetch_more_requests=0.2, fetch_case_us=2.0, merge_case_us=10.0,
     node_cores=10.0, shared_gb_s=10.0, link_gb_s=1.0, request_ms=30.0, fetches=8.0,
 )  # fmt: skip
 
@@ -49,13 +52,22 @@ def test_shards_fly_ten_times_as_fast_on_ten_times_the_nodes_and_merging_takes_a
         assert few[name] == pytest.approx(10.0 * many[name], rel=0.02)  # whole parts
     assert merging(COSTS, 1e9, 10) == pytest.approx(merging(COSTS, 1e9, 100), rel=0.02)
     assert merging(COSTS, 1e9, 10)["merging"] == pytest.approx(1e4)
-    assert merging(COSTS, 1e9, 10)["fetching"] == pytest.approx((10 * 3052 * 2 * 0.030 + 1e9 * 2e-6) / 8)
+    assert merging(COSTS, 1e9, 10)["fetching"] == pytest.approx(
+        ((10 * 3052 * 2 + 1e9 * 0.2e-3) * 0.030 + 1e9 * 2e-6) / 8
+    )
 
 
 def test_publishing_takes_what_its_requests_bytes_and_processor_take():
     published = as_shards(replace(COSTS, request_ms=0.0), 1e9, 10)["publishing"]
     assert published == pytest.approx(1e8 * (4e-6 + 1e-6 + 3e-6 + 3 * 200e-9))
-    assert as_shards(COSTS, 1e9, 10)["publishing"] - published == pytest.approx(3052 * 7 * 0.030)
+    assert as_shards(COSTS, 1e9, 10)["publishing"] - published == pytest.approx((3052 * 7 + 1e8 * 0.5e-3) * 0.030)
+
+
+def test_each_size_of_part_that_was_measured_gives_its_own_requests_back():
+    small, large = (Stored(10, 1, {"fetched": Step(1.0, 1.0, Counter(GetObject=n))}) for n in (22, 75))
+    more = more_requests(("fetched",), small, large)
+    for stored, cases in ((small, SMALL_PART), (large, LARGEST_CHUNK)):
+        assert 2.2 + 1e-3 * more * (cases - SMALL_PART) == pytest.approx(stored.requests(["fetched"]))
 
 
 def test_more_cases_than_a_run_may_have_are_several_runs():

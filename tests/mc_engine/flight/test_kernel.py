@@ -210,6 +210,16 @@ def test_a_file_with_options_of_numba_in_the_working_folder_belongs_to_what_a_ke
     assert len({*files}) == 3
 
 
+def test_the_folder_of_numbas_own_cache_belongs_to_no_kernel(tmp_path, monkeypatch):
+    one, files = kernel_cache.Kernel(tmp_path / "kernel.py", lambda form: ("", None)), []
+    for name, value in (("NUMBA_CACHE_DIR", "here"), ("NUMBA_CACHE_DIR", "there"), ("NUMBA_OPT", "1")):
+        monkeypatch.setenv(name, value)
+        kernel_cache._target.cache_clear()
+        files.append(one.file(("float64",)))
+    kernel_cache._target.cache_clear()
+    assert files[0] == files[1] != files[2]
+
+
 def test_a_full_disk_of_the_cache_is_told_and_the_cases_fly(tmp_path, monkeypatch, caplog):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")

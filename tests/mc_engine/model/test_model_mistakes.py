@@ -293,6 +293,12 @@ RECORDS = {
         "`tables` takes (p, o); the engine gives it (o)",
     ),
     "no decorator": ([(RHS, "def rhs")], "def rhs", "`rhs` is not marked; write @physics"),
+    "event without decorator": ([("@physics\ndef climb", "def climb")], "def climb", "`climb` is not marked; write @"),
+    "a metric that is declared": (
+        [in_front("@physics\ndef evaluate(t, s):\n    return Metrics(top_speed=t)"), given("evaluate=evaluate")],
+        "    return Metrics(",
+        'has no field "top_speed"; the engine computes it as it is declared: leave it out here',
+    ),
     "async def": ([(RHS, "@physics\nasync def rhs")], "@physics\nasync def rhs", "write def and `return`"),
     "NaN derivative": (
         [(ACCELERATION, "    g = -MU_EARTH / (r2 * sqrt(-r2))\n")],

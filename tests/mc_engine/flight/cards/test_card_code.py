@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from assembler import assembled, ptxas
 from processor_twin import ProcessorTwin
-from shipped_kernels import NAMES, OFTEN, kernel_call
+from shipped_kernels import MODELS, NAMES, kernel_call
 
 from mc_engine.errors import EngineError
 from mc_engine.flight.card_code import CAPABILITIES, PER_CASE, TRIPLE, choices_of_bits, ptx_of, thread_code
 
 CASES = 8
-CAMPAIGNS = [name if name in OFTEN else pytest.param(name, marks=pytest.mark.slow) for name in NAMES]
+CAMPAIGNS = [name if name in MODELS else pytest.param(name, marks=pytest.mark.slow) for name in NAMES]
 _LANES = re.compile(r"call (?:<(\d+) x )?double>? @llvm\.fma\.")
 _EXTREMES = re.compile(r"^\s*(?:min|max)\.f64\s+(%\w+),", re.MULTILINE)
 

@@ -13,7 +13,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 from fake_driver import FakeDriver, install
-from shipped_kernels import NAMES, OFTEN, shipped
+from shipped_kernels import NAMES, shipped
 from typer.testing import CliRunner
 
 from mc_engine.campaign.loading import load_campaign
@@ -28,6 +28,7 @@ from mc_engine.runner.backends import Backend
 from tests.mc_engine.flight.falling_ball import python_campaign
 
 CASES, CHUNK = 96, 40
+OFTEN = ("minimal", "geo_injection")  # of fixed steps and of adaptive ones; the others are slow tests
 CAMPAIGNS = [name if name in OFTEN else pytest.param(name, marks=pytest.mark.slow) for name in NAMES]
 
 
