@@ -102,8 +102,8 @@ class InterpretedFlight:
                     names[name] = FunctionType(value.py_func.__code__, self._interpreted(home))
                 elif name in _INTRINSICS:
                     names[name] = _INTRINSICS[name]
-            names |= {"total": self.total, "map_fields": self.map_fields, "record": self.record}
-            names["unset"] = self.unset
+            names |= {"total": self.total, "total_in_pairs": self.total, "map_fields": self.map_fields}
+            names |= {"record": self.record, "unset": self.unset}
         return self._names[module]
 
     def total(self, fields: Sequence[Number]) -> Number:

@@ -1,7 +1,8 @@
 """The block loop on a fixed time grid: W cases side by side, sampled control, events, running extrema.
 
 All lanes of a block share the grid; a lane that meets an event takes its own way to the end of the step and
-rejoins.  Lanes never look at each other: a lane that has ended or failed keeps its last values.
+rejoins.  Lanes never look at each other: a lane that has ended or failed keeps its last values.  Of its memory, most of
+what a model holds, they are set aside: to choose between old and new at every sample costs copies of all of it.
 
 The loop is handed its `Method`: the classical Runge-Kutta method of fourth order, which is here, or one that uses
 earlier steps (`multistep`, `gauss_jackson`).  W. Kutta, Zeitschrift für Mathematik und Physik 46 (1901) 435-453.
@@ -30,7 +31,7 @@ from mc_engine.lanes.tuples import (
     spread,
     store,
     store_fields,
-    total,
+    total_in_pairs,
 )
 from mc_engine.status import EVENT_LIMIT, NO_STOP, NOT_FINITE
 
@@ -115,7 +116,7 @@ def _step(f, method, past, has_events, t, finish, h, s, m, p, o, flying, history
                 f, method, t, finish, h, s, end, m, p, o, g, g_end, flying, history, rows
             )
             past = method.restart(past, met)
-    size = total(end)
+    size = total_in_pairs(end)
     broken = lost | (flying & (not (size - size == 0.0)))
     return end, m, now, stopped, overrun & (not broken), broken, past
 
@@ -141,6 +142,7 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
     when, last = map_fields(extrema.first_time, v1, t), map_fields(extrema.first_time, w1, t)
     t0 = t1 = t2 = t
     past = method.begin(method.tables, stage_memory(s, MOST_SLOPES), s, t)
+    last_memory = m
     for k in range(n_steps):
         recorded = history.shape[0] > 0 and k % stride == 0
         if k > 0 and k % control_every == 0:
@@ -148,7 +150,7 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
                 record_row(f, history, rows, flying, t2, s, m, p, o)
             held = spread(f.control(t2, s, m, p, o, Draws(key, case, float(k // control_every))), t)
             past = method.restart(past, unequal(m, held, t))
-            m = select(flying, held, m)
+            m = held  # of lanes that have ended, too: what they held then is in `last_memory`
         seen = spread(f.observe(t2, s, m, p, o), t)
         v2, w2 = f.peaks_of(seen), f.lasts_of(seen)
         best, when, last = track(flying, f.smooth_of(v2), (v0, v1, v2), (t0, t1, t2), (w1, w2), best, when, last)
@@ -167,7 +169,8 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
         ended = moved & (stopped | overrun)
         flying = moved & (not ended)
         at_end = ended | (flying & (k + 1 == n_steps))
-        if any_lane(at_end):
+        if any_lane(at_end | broken):
+            last_memory = select(at_end | broken, m, last_memory)
             seen = look_shared(f, t, s, m, p, o)
             v3, w3 = f.peaks_of(seen), f.lasts_of(seen)
             best, when, last = track(at_end, f.smooth_of(v3), (v1, v2, v3), (t1, t2, t), (w2, w3), best, when, last)
@@ -178,7 +181,7 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
         if not any_lane(flying):
             break
         v0, v1, w1, t0, t1, t2 = v1, v2, w2, t1, t2, finish
-    return t, s, m, status, flying, best, when, last
+    return t, s, last_memory, status, flying, best, when, last
 
 
 fly_block = compile_inline(_fly_block)

@@ -177,6 +177,23 @@ def total(typingctx, fields):
 
 
 @intrinsic
+def total_in_pairs(typingctx, fields):
+    """Sum of the fields, by sums of pairs: nothing waits for a chain as long as the tuple.
+
+    Where only the sign of infinity or not a number counts; a `total` has its rounding, on which results rest.
+    """
+
+    def codegen(context, builder, sig, args):
+        values = [_item(builder, args[0], i) for i in range(len(fields))]
+        while len(values) > 1:
+            pairs = [builder.fadd(x, y) for x, y in zip(values[::2], values[1::2], strict=False)]
+            values = pairs + values[2 * len(pairs) :]
+        return values[0]
+
+    return fields[0](fields), codegen
+
+
+@intrinsic
 def least(typingctx, fields):
     """Smallest field."""
     return _reduction(lambda b, x, y: b.select(b.fcmp_ordered("<", x, y), x, y))(typingctx, fields)

@@ -4,7 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from flown_models import RAIL, flown, same_bytes
+from flown_models import FOLDER, RAIL, flown, same_bytes
+
+from mc_engine.model import load_model
 
 
 def swing_down(step):
@@ -116,6 +118,15 @@ def test_cases_with_events_keep_their_bytes_at_every_width(width):
     eight = flown(RAIL, **MIXED)
     assert {"ok", "no-stop"} <= set(eight["status"])
     same_bytes(eight, flown(RAIL, width=width, **MIXED))
+
+
+def test_a_case_keeps_what_its_control_held_when_it_stopped_however_long_its_neighbours_fly():
+    """From 5 n^2 m at 10 m/s^2 the ground comes after n s; samples are taken every 0.5 s, none at the stop itself."""
+    seconds = np.array([1.1, 4.3, 2.2, 0.3, 3.4, 1.6, 0.8, 2.9])
+    columns = flown(load_model("sampled_fall.py", FOLDER), height_m=5.0 * seconds**2, every=2.0)
+    np.testing.assert_allclose(columns["end_time_s"], seconds, rtol=1e-12)
+    np.testing.assert_array_equal(columns["samples"], np.ceil(seconds / 0.5))
+    np.testing.assert_array_equal(columns["sampled_at_s"], 0.5 * np.floor(seconds / 0.5))
 
 
 def test_switch_counts_for_the_cases_that_met_an_event_and_for_no_neighbour():
