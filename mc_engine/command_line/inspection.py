@@ -36,7 +36,7 @@ def debug(
         typer.Option(
             metavar="NAME",
             help="Stop when this event happens: in switch, in the next rhs where the model has no switch, or in "
-            "observe where it ends the case.",
+            "observe where it ends the case. A delayed event happens at its crossing, and as NAME_due when it acts.",
         ),
     ] = None,
     at_nan: Annotated[
@@ -69,6 +69,10 @@ def debug(
     if stop == Stop() and has_own_stops(campaign.model):
         stop = None
     inputs, noise = inputs_of(campaign, case)
+    if case is not None and case >= campaign.cases:
+        typer.echo(
+            f"the campaign has the cases 0 to {campaign.cases - 1}; {case} is one that `extend` would add", err=True
+        )
     ended = _in_debugger(lambda: fly_debugged(campaign.model, inputs, noise, campaign.seed, stop, typer.echo))
     if ended is not None:
         _echo_end("the nominal case" if case is None else f"case {case}", ended, stop)

@@ -19,7 +19,7 @@ from numba.core.dispatcher import Dispatcher
 from mc_engine.lanes.composed import Alternatives, ComposedFunction, has_powers
 from mc_engine.lanes.fixed_step import Method
 from mc_engine.lanes.functions import TABLES, fma
-from mc_engine.lanes.number import Number, Origin, calling, number, numbers
+from mc_engine.lanes.number import Number, Origin, calling, number
 from mc_engine.model.fields import AdaptiveStep, uses_rates
 from mc_engine.model.record import Model
 
@@ -83,9 +83,7 @@ class InterpretedFlight:
 
     def call(self, name: str, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         """The result of one function of the model.  name : what the engine calls it, such as "rhs"."""
-        if self._has_powers:
-            return function(*(numbers(argument) for argument in arguments))
-        return calling(name, function, *arguments)
+        return calling(name, function, arguments, floats_first=not self._has_powers)
 
     def record(self, history: np.ndarray, rows: np.ndarray, lanes: bool, t: Any, fields: Any) -> None:
         """Write one more row of the history.  fields : what `observe` has just given."""

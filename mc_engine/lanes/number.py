@@ -10,7 +10,7 @@ import inspect
 import math
 import operator
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
@@ -73,16 +73,20 @@ def numbers(value: Any) -> Any:
     if isinstance(value, tuple):
         fields = [numbers(field) for field in value]
         return type(value)(*fields) if hasattr(value, "_fields") else tuple(fields)
-    return number(value) if isinstance(value, float) else value
+    return number(value) if isinstance(value, float | int) and not isinstance(value, bool) else value
 
 
 def result_of(operation: str, arguments: tuple[Any, ...], value: float) -> Number:
     """The result of an operation as a Number."""
     made = Number(value)
     if not math.isfinite(value):
-        known = (argument.origin for argument in arguments if type(argument) is Number and argument.origin is not None)
-        made.origin = next(known, None) or _origin(operation, arguments, value)
+        made.origin = _known(arguments) or _origin(operation, arguments, value)
     return made
+
+
+def _known(arguments: tuple[Any, ...]) -> Origin | None:
+    """The first origin among those of the arguments."""
+    return next((argument.origin for argument in arguments if type(argument) is Number and argument.origin), None)
 
 
 def taking_numbers(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -102,18 +106,28 @@ def taking_numbers(function: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
-def calling(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
+def calling(name: str, function: Callable[..., Any], arguments: tuple[Any, ...], floats_first: bool = True) -> Any:
     """The result of a function of a model as a kernel has it, with origins.
 
-    On floats first, which is ten times as fast, and with Numbers where that gives one that is not finite.
+    floats_first : on floats, which is ten times as fast, and with Numbers only where that gives one that is not finite.
     """
     try:
-        result = function(*(_bare(argument) for argument in arguments))
+        result = function(*(_bare(argument) for argument in arguments)) if floats_first else math.nan
         if _is_finite(result):
             return result
     except ArithmeticError:  # where kernels go on with an infinity
         pass
     return function(*(numbers(argument) for argument in arguments))
+
+
+def as_in_kernels(function: Callable[..., Any], arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
+    """What a function gives for plain numbers where Python would raise and kernels go on, as for 1/0."""
+    return _bare(function(*map(numbers, arguments), **{name: numbers(value) for name, value in named.items()}))
+
+
+def are_numbers(value: Any) -> bool:
+    """Whether this is a number, or a record of numbers: no arrays."""
+    return all(map(are_numbers, value)) if isinstance(value, tuple) else isinstance(value, float | int)
 
 
 def _bare(value: Any) -> Any:
@@ -141,6 +155,8 @@ def _origin(operation: str, arguments: tuple[Any, ...], value: float) -> Origin:
         if code.co_filename in _MATHEMATICS and not places:
             operation = code.co_name
             arguments = tuple(frame.f_locals[name] for name in code.co_varnames[: code.co_argcount])
+            if operation != "where" and (known := _known(arguments)):  # log(nan) is a constant that it has at hand
+                return known
         elif _HERE not in Path(code.co_filename).parents:
             places.append(Place(code.co_filename, frame.f_lineno))
         frame = frame.f_back

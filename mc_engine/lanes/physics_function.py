@@ -1,7 +1,8 @@
 """The decorator of compiled physics.
 
-`physics` marks a function that is written once on plain numbers.  Called from Python it simply runs, on
-floats or NumPy arrays; used inside a kernel it is compiled for one case and for vectors of cases.
+`physics` marks a function that is written once on plain numbers.  Called from Python it simply runs, on floats, with
+which 1/0 is infinite as in kernels, or on NumPy arrays; used inside a kernel it is compiled for one case and for
+vectors of cases.
 Nothing is compiled, and numba is not imported, before a kernel asks for it.
 """
 
@@ -10,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mc_engine.errors import ModelError
+from mc_engine.lanes.number import are_numbers, as_in_kernels
 
 
 class PhysicsFunction:
@@ -20,7 +22,12 @@ class PhysicsFunction:
         functools.update_wrapper(self, function)
 
     def __call__(self, *args: Any, **named: Any) -> Any:
-        return self.function(*args, **named)
+        try:
+            return self.function(*args, **named)
+        except ArithmeticError:
+            if not are_numbers((*args, *named.values())):
+                raise
+            return as_in_kernels(self.function, args, named)
 
     @functools.cached_property
     def compiled(self) -> Any:

@@ -112,6 +112,9 @@ def model(
     for what, record in (("inputs", inputs), ("states", states), ("outputs", outputs), ("metrics", metrics)):
         if not hasattr(record, "declared"):
             raise ModelError(f"`{what}` is {record!r}; declare it, {_DECLARATIONS[what]} = {what}(...)")
+        if record.__name__ != _DECLARATIONS[what]:
+            maker = next(name for name, title in _DECLARATIONS.items() if title == record.__name__)
+            raise ModelError(f"`{what}` is what {maker}(...) made; hand over what {what}(...) made")
     kernel_parameters = kernel_parameters or inputs
     phases = _phases(phases, rhs=rhs, control=control, events=events)
     declared = events_of(phases, checked_events(events))

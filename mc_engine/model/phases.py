@@ -18,7 +18,7 @@ from mc_engine.model.fields import Event
 from mc_engine.suggestions import hint
 
 PHASE, BEGAN = "in_phase", "phase_began"  # fields of the discrete state
-_NEVER, _NAN = 1e300, float("nan")
+NEVER, _NAN = 1e300, float("nan")
 _TIME, _STATE, _MEMORY, _PARAMETERS, _SETTINGS, _LAST = range(6)  # of the arguments; the last are draws or hit
 _ALL = tuple(range(6))
 
@@ -56,15 +56,15 @@ def _flag(number, wanted):
 @physics
 def _due(due, crossing, acted, t, after):
     """Time at which the action is due; a crossing while it is being waited for changes nothing."""
-    due = where(acted > 0.5, _NEVER, due)
+    due = where(acted > 0.5, NEVER, due)
     ahead = where(t + after > t, t + after, t + 4e-16 * abs(t) + 1e-300)  # a step cannot end before it begins
     ahead = where(after == after, ahead, after)
-    return where((crossing > 0.5) & (due == _NEVER), ahead, due)
+    return where((crossing > 0.5) & (due == NEVER), ahead, due)
 
 
 @physics
 def _since_due(t, due):
-    return where(due == _NEVER, -1.0, t - due)
+    return where(due == NEVER, -1.0, t - due)
 
 
 @physics
@@ -99,7 +99,7 @@ class Memory:
         self.values = [pair for pair in dict.fromkeys(noted) if pair[1]]
         self.times = list(dict.fromkeys(event for event, _ in noted))
         self.kept: dict[str, float] = {PHASE: 0.0, BEGAN: 0.0} if phases else {}
-        self.kept |= {due_field(name): _NEVER for name in self.delayed}
+        self.kept |= {due_field(name): NEVER for name in self.delayed}
         self.kept |= {noted_field(name): _NAN for name in self.times}
         self.kept |= {noted_field(*pair): _NAN for pair in self.values}
         self._own_fields = getattr(own, "_fields", ())
@@ -330,7 +330,7 @@ def _refuse_event(name: str, event: Event, phases: Mapping[str, Phase]) -> None:
     if event.to and event.action != "switch":
         raise ModelError(f'the event "{name}" has the action "{event.action}" and begins the phase "{event.to}"; '
                          "leave one of them out")  # fmt: skip
-    if not isinstance(event.after, str) and not 0.0 <= event.after < _NEVER:
+    if not isinstance(event.after, str) and not 0.0 <= event.after < NEVER:
         raise ModelError(f'the event "{name}" acts after {event.after!r} s; a delay is a number not below 0, or the '
                          "name of a parameter without its unit")  # fmt: skip
 

@@ -345,7 +345,7 @@ def _refuse_infinite(
     for field, value in zip(result._fields, result, strict=True):
         if not np.isfinite(value).all():
             bad = np.ravel(value)[~np.isfinite(np.ravel(value))][0]
-            lost = getattr(calling(name, function, *(_first_case(argument) for argument in arguments)), field)
+            lost = getattr(calling(name, function, tuple(map(_first_case, arguments))), field)
             origin = getattr(lost, "origin", None)
             first = origin_sentence(origin) if origin else f"{place_of(function)}: out of range"
             raise Breach(f'{first}; so `{name}` gives {bad:g} for {what} of "{field}" at the start of the nominal '

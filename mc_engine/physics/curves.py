@@ -9,6 +9,7 @@ numbers compile nothing.  The range is divided into equal buckets, so that two c
 on both sides of an argument (see `_axis`).  An argument that is not a number gives one that is not.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -60,7 +61,8 @@ class Curve(PhysicsFunction):
         if Number not in map(type, args):
             return self.function(*args)
         plain = [float(argument) if type(argument) is Number else argument for argument in args]
-        return result_of(self.words, args, self.function(*plain))
+        is_left = self.outside == "ends" and all(map(math.isfinite, plain))
+        return result_of(f"{self.words}, left at its end," if is_left else self.words, args, self.function(*plain))
 
     def __repr__(self) -> str:
         return f"<{self.words}>"

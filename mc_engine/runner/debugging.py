@@ -12,6 +12,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass
+from functools import partial
 from importlib.abc import InspectLoader
 from inspect import unwrap
 from types import CodeType, FunctionType
@@ -96,7 +97,7 @@ class _StoppingFlight(InterpretedFlight):
 
     def __init__(self, model: Model, stop: Stop | None, tell: Callable[[str], None]):
         self.stopped, self.origin_call = False, -1
-        self._tell, self._name = tell, ""
+        self._tell = tell
         self._stop, self._calls, self._due, self._event = stop, 0, False, -1
         self.functions: tuple[str, ...] = () if stop is None else ("rhs",)
         if stop is not None and stop.event is not None:
@@ -108,7 +109,7 @@ class _StoppingFlight(InterpretedFlight):
         super().__init__(model)
 
     def call(self, name: str, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-        stop, self._calls, self._name = self._stop, self._calls + 1, name
+        stop, self._calls = self._stop, self._calls + 1
         if stop is not None and not self.stopped:
             if stop.not_finite:
                 self._due = self._calls == self.origin_call
@@ -125,12 +126,12 @@ class _StoppingFlight(InterpretedFlight):
 
         return has_fired
 
-    def is_due(self) -> bool:
-        """Whether to stop here; asked in the functions of the model."""
+    def is_due(self, name: str) -> bool:
+        """Whether to stop here; asked in the functions of the model, each by its name."""
         due, self._due = self._due, False
         if due:
             self.stopped = True
-            self._tell(f"stopped in `{self._name}` at t = {self.t:.9g} s")
+            self._tell(f"stopped in `{name}` at t = {self.t:.9g} s")
         return due
 
 
@@ -209,8 +210,8 @@ def _reachable(functions: Iterable[PhysicsFunction]) -> list[PhysicsFunction]:
 
 
 @contextlib.contextmanager
-def _stopping(functions: Iterable[tuple[PhysicsFunction, int]], is_due: Callable[[], bool]) -> Iterator[None]:
-    """Within the block these functions stop where `is_due()`: before a line of theirs, or at their beginning for 0."""
+def _stopping(functions: Iterable[tuple[PhysicsFunction, int]], is_due: Callable[[str], bool]) -> Iterator[None]:
+    """Within the block these functions stop where `is_due(name)`: before a line of theirs, at their beginning for 0."""
     before = [(physics, physics.function) for physics, _ in functions]
     try:
         for physics, line in functions:
@@ -221,7 +222,7 @@ def _stopping(functions: Iterable[tuple[PhysicsFunction, int]], is_due: Callable
             physics.function = function
 
 
-def _with_stop(function: Any, line: int, is_due: Callable[[], bool]) -> Any:
+def _with_stop(function: Any, line: int, is_due: Callable[[str], bool]) -> Any:
     """The function with `if is_due(): breakpoint()` before the statement of a line, or as its first statement."""
     definition = definition_of(function.__code__)
     if not isinstance(definition, ast.FunctionDef):
@@ -234,7 +235,7 @@ def _with_stop(function: Any, line: int, is_due: Callable[[], bool]) -> Any:
         if isinstance(node, ast.stmt | ast.expr):
             node.lineno = node.end_lineno = own.lineno
     body.insert(index, stop)
-    given = {"__is_due__": is_due, "__breakpoint__": builtins.breakpoint}
+    given = {"__is_due__": partial(is_due, function.__name__), "__breakpoint__": builtins.breakpoint}
     given |= {
         name: cell.cell_contents
         for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)

@@ -3,6 +3,7 @@
 The case is flown by Python with the loops that kernels are compiled from, so its steps are those of the stored case.
 """
 
+import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,7 +17,7 @@ import pandas as pd
 from mc_engine.flight.flight import fly_interpreted
 from mc_engine.flight.interpreted import InterpretedFlight
 from mc_engine.model.faults import is_the_users
-from mc_engine.model.phases import BEGAN, PHASE
+from mc_engine.model.phases import BEGAN, NEVER, PHASE
 from mc_engine.model.record import Model
 from mc_engine.store.histories import PHASE_COLUMN
 
@@ -124,7 +125,7 @@ def _numbers(name: str, value: Any) -> Iterator[tuple[str, float]]:
         for i, item in enumerate(value):
             yield from _numbers(f"{name}.{fields[i]}" if fields else f"{name}[{i}]", item)
     elif isinstance(value, float | int):
-        yield name, float(value)
+        yield name, math.nan if value == NEVER else float(value)
 
 
 @lru_cache(maxsize=256)

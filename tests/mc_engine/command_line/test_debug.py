@@ -93,5 +93,5 @@ def test_it_stops_in_observe_where_an_event_ends_a_case_that_also_notes_it(tmp_p
     folder = write_campaign(tmp_path / "noted", noted, ("import Event,", "import value_at, Event,"))
     _status, printed, complaint = debug(folder, "--at-event", "apogee", typed="q\n")
     assert "did not happen" not in printed + complaint
-    assert "stopped in `" in printed
+    assert "stopped in `observe` at t = " in printed
     assert re.search(r"> model\.py\(\d+\)observe\(\)", printed)

@@ -105,6 +105,16 @@ def mc_engine_says(folder, *words):
     return done.stdout.splitlines()
 
 
+@pytest.mark.parametrize("through", ["log(low)", "pow(low, 0.5)", "atan2(1.0, low)", "low**3"])
+def test_the_line_is_named_whatever_the_lost_number_goes_through_on_its_way(through, tmp_path):
+    line, below = "    low = sqrt(s.x + 6.9e6)", "    g = -MU_EARTH"
+    campaign = campaign_with(tmp_path, (below, f"{line}\n    late = {through}\n{below}"),
+                             ("vy=g * s.y)", "vy=g * s.y + 0.0 * late)"),
+                             ("import cos,", "import atan2, log, pow, cos,"))  # fmt: skip
+    place = f"model.py, line {line_of(tmp_path, line)}: `{line.strip()}`: "
+    assert lost(campaign).startswith(f"{place}the square root of -")
+
+
 HEATING = "from mc_engine.physics.heating import sutton_graves\n"
 PUSH = "    force = m.burning * thrust_of(p)\n"
 HELD, SWITCHED = "    return Memory(nozzle=nozzle, burning=m", "    return s, Memory(nozzle=m.nozzle"

@@ -63,7 +63,7 @@ def test_every_function_hands_on_what_is_not_a_number_in_any_argument_at_every_w
 
 def test_interpreted_every_function_gives_the_bits_of_the_kernel(compiled):
     for i, (x, y) in enumerate(zip(X.tolist(), Y.tolist(), strict=True)):
-        found = calling("everything", _everything, Number(x), Number(y))
+        found = calling("everything", _everything, (Number(x), Number(y)))
         np.testing.assert_array_equal(bits(found), bits(compiled[:, i]), err_msg=f"{x}, {y}")
 
 

@@ -85,6 +85,8 @@ MISTAKES = {
     "event without function": (("Event(climb, ", "Event("), 'the event "apogee" has no function; declare it so: '),
     "argument of an event": (("def climb(s)", "def climb(x)"), 'event "apogee" in line 33 takes "x"'),
     "no declaration": (("states=State", "states=('x', 'y')"), "`states` is ('x', 'y'); declare it, State ="),
+    "states and outputs exchanged": (("states=State, outputs=Outputs", "states=Outputs, outputs=State"),
+                                     "`states` is what outputs(...) made; hand over what states(...) made"),
     "a number as a meaning": (('x_m="x"', "x_m=3"), 'the state "x_m" is 3; it must be its meaning, a text, or Field('),
     "two of a name": (('x_m="x"', 'x_m="x", x_km="x"'), 'State: two names are "x" without their units'),
 }  # fmt: skip

@@ -122,10 +122,10 @@ def test_a_case_ends_where_its_curve_does(tmp_path):
     assert (columns["end_time_s"] <= 3.1).all()
     flight = InterpretedFlight(model, 60.0)
     fly_interpreted(flight, {"mass_kg": 2.0}, 0, 1)
-    assert flight.origin.operation == "the curve thrust.csv"
+    assert flight.origin.operation == "the curve thrust.csv, left at its end,"
     assert 3.1 < flight.origin.arguments[0] < 3.6
     at = flight.origin.arguments[0]
-    assert f"the curve thrust.csv at {at!r} is not a number (t = " in origin_sentence(flight.origin)
+    assert f"the curve thrust.csv, left at its end, at {at!r} is not a number (t = " in origin_sentence(flight.origin)
 
 
 def test_a_file_that_only_a_variable_names_is_refused(tmp_path):

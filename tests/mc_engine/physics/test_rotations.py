@@ -203,3 +203,8 @@ def test_products_of_vectors_are_numpys():
     assert np.abs(found[4:7] - a / np.linalg.norm(a, axis=0)).max() < 1e-15
     assert np.abs(found[7:] - (a + 2.0 * b)).max() < 1e-14
     assert np.array(vectors.subtracted(vectors.added(Vector(*a), Vector(*b)), Vector(*b))) == pytest.approx(a)
+
+
+def test_a_division_by_zero_on_plain_numbers_is_that_of_kernels():
+    assert np.isnan(rotations.normalized(rotations.Quaternion(0.0, 0.0, 0.0, 0.0))).all()
+    assert np.isnan(rotations.normalized(rotations.Quaternion(0, 0, 0, 0))).all()

@@ -7,11 +7,14 @@ import mc_engine
 from mc_engine import load_campaign, open_run
 from mc_engine.campaign.search import SHIPPED
 from mc_engine.errors import ModelError, StoreError
+from mc_engine.model import load_model
 from mc_engine.physics.constants import MU_EARTH
 from mc_engine.runner import runner
+from mc_engine.studies.trace import trace_case
 from reports.drawing.marks import Bar
 from reports.figures.table_figures import fuel_map, histogram, scatter
 from tests.mc_engine.flight.falling_ball import python_campaign
+from tests.mc_engine.lanes.flown_models import FOLDER, inputs_of
 
 
 @pytest.fixture(scope="module")
@@ -143,3 +146,10 @@ def test_figures_of_a_table_draw_its_cases_with_its_units(run):
         "pitch error [deg]",
         "apogee altitude [km]",
     ]
+
+
+def test_a_trace_has_no_number_for_an_action_that_is_not_due():
+    model = load_model("late_ball.py", FOLDER)
+    trace, _ = trace_case(model, inputs_of(model, {}), 0, 1, 60.0)
+    assert 0 < trace["m.mark_due"].notna().sum() < len(trace)
+    assert trace["m.mark_due"].max() <= trace["t_s"].max()
