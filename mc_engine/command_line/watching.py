@@ -81,6 +81,10 @@ def watch_campaign(reference: str, folder: Path | None, context: typer.Context) 
     options = {"--cases": str(CASES), **_options_given(context)}
     if unfit := [option for option in options if option in _OF_A_KEPT_RUN]:
         leave(USAGE, f"{unfit[0]}: is not for --watch, which keeps no run")
+    from mc_engine.runner.backends import Backend
+
+    if "--backend" in options:  # one that this machine lacks is refused now, not at every saved change
+        Backend(options["--backend"], options.get("--scheduler"))
     file = find_campaign(reference)
     name = campaign_name(file)
     arguments = [reference, *(word for option in options.items() for word in option)]

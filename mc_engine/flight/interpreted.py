@@ -56,6 +56,8 @@ class InterpretedFlight:
         self, parameters: np.ndarray, settings: np.ndarray, data: Any, key: Any, cases: np.ndarray, *rest: Any
     ) -> None:
         """Fly the first case; arguments and results are those of the model's kernel."""
+        from mc_engine.flight.kernel_parts import tracking_of
+
         model, adaptive = self.model, isinstance(self.model.clock, AdaptiveStep)
         fly = self._interpreted("adaptive_flight" if adaptive else "fixed_step")["fly"]
         actions = [event.action for event in model.event_list]
@@ -68,8 +70,9 @@ class InterpretedFlight:
             return
         n_steps, h, every, *tables, time, status, state, metrics, history, rows, stride = rest
         stepping = self._interpreted("gauss_jackson" if self._picks else "multistep" if tables else "fixed_step")
-        own = (*tables, *self._picks)
-        method = Method(**{name: stepping[name] for name in Method._fields[:-1]}, tables=own)
+        own, tracking = (*tables, *self._picks), self._interpreted(tracking_of(model))
+        functions = {name: stepping[name] for name in Method._fields[:-2]}
+        method = Method(**functions, track=tracking["track"], tables=own)
         grid, kinds, results = (n_steps, h, every), (bool(actions), must_stop), (time, status, state, metrics)
         fly(self._functions, method, *common, *inputs, grid, kinds, results, history, rows, stride)
 

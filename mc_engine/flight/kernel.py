@@ -18,7 +18,7 @@ import numpy as np
 from mc_engine.cache_folder import cache_folder
 from mc_engine.errors import DiskError, ModelError
 from mc_engine.flight.kernel_key import Recorder, kernel_key
-from mc_engine.flight.kernel_parts import Functions, parts_of, second_order_of
+from mc_engine.flight.kernel_parts import Functions, parts_of, second_order_of, tracking_of
 from mc_engine.lanes.kernel_cache import Form, Kernel, replace_file
 from mc_engine.lanes.runge_kutta_pairs import PAIRS
 from mc_engine.model.fields import AdaptiveStep, FixedStep, uses_rates
@@ -47,6 +47,7 @@ from mc_engine.lanes.compiler import compile_kernel
 from mc_engine.lanes.fixed_step import Method, fly
 from mc_engine.lanes.kernel_data import hand_over
 from mc_engine.lanes.{module} import advance, begin, restart, single
+from mc_engine.lanes.{tracking} import track
 
 _F, Parameters, Settings, HAS_EVENTS, MUST_STOP, BLOCKS = PARTS
 {names} = _F
@@ -58,7 +59,7 @@ def kernel(
     rows, stride,
 ):
     hand_over(BLOCKS, data)
-    f, method = Functions({names}), Method(begin, restart, advance, single, ({tables}))
+    f, method = Functions({names}), Method(begin, restart, advance, single, track, ({tables}))
     grid, kinds, out = (n_steps, h, control_every), (HAS_EVENTS, MUST_STOP), (time, status, state, metrics)
     fly(
         f, method, Parameters, Settings, {width}, parameters, settings, key, cases, grid, kinds, out, history, rows,
@@ -138,7 +139,7 @@ def build_kernel(model: Model, folder: Path | None = None, width: int = WIDTH) -
     folder : see `sources_of`.  The kernel's first call compiles it or loads it from the cache.
     """
     module = sources_of(model, folder).module
-    template = _template(model.clock)
+    template = _template(model)
     digest, is_complete = kernel_key(_handed(module.MODEL, model, Recorder()), template)
     if not is_complete:
         what = f"{digest} {source_digest(model, folder)} {module.__name__} {module.__file__}"
@@ -180,13 +181,13 @@ def kernel_of(function: Callable[..., Any]) -> Kernel:
     return Kernel(cache_folder() / "kernels" / digest[:20] / function.__name__, made.library)
 
 
-def _template(clock: FixedStep | AdaptiveStep) -> str:
+def _template(model: Model) -> str:
     """The text of a kernel's file; methods of one kind share a kernel, which is handed their tables."""
+    clock = model.clock
     if isinstance(clock, AdaptiveStep):
         return _ADAPTIVE
-    if uses_rates(clock):
-        return _GAUSS_JACKSON
-    return _RUNGE_KUTTA if clock.method == "rk4" else _MULTISTEP
+    text = _GAUSS_JACKSON if uses_rates(clock) else _RUNGE_KUTTA if clock.method == "rk4" else _MULTISTEP
+    return text.replace("{tracking}", tracking_of(model))
 
 
 def _write_source(path: Path, text: bytes) -> None:

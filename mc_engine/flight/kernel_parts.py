@@ -173,6 +173,16 @@ def second_order_of(model: Model, makers: Any = None) -> tuple[Any, ...]:
     )
 
 
+def tracking_of(model: Model) -> str:
+    """The module of `mc_engine.lanes` by which a model on a fixed grid tracks its extremes, see `Method`.
+
+    Only models with extremes that can lie between grid points pay for the polynomials of a multistep method.
+    """
+    assert isinstance(model.clock, FixedStep)
+    between = any(extremum.smooth or extremum.kind == "last_above" for extremum in model.extrema)
+    return "multistep" if between and model.clock.method != "rk4" else "fixed_step"
+
+
 def _sign(extremum: Extremum) -> float:
     return -1.0 if extremum.kind == "min" else 1.0
 

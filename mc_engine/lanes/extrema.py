@@ -3,7 +3,7 @@
 An output that is NaN once has no extreme value; it has a last time above a level if it is above it later.
 """
 
-from mc_engine.lanes.functions import where
+from mc_engine.lanes.functions import maximum, minimum, where
 from mc_engine.lanes.physics_function import physics
 
 # what flights with adaptive steps track as one; a corner is a peak that is taken at the steps
@@ -55,6 +55,66 @@ def crest_value(best, unused, v0, v1, v2, t0, t1, t2, smooth, mask):
     bend = ((v2 - v1) * a - (v1 - v0) * b) / scale
     top = v1 + x * (slope + x * bend)
     return where(mask & (v1 != v1), v1, where(usable & (top > best), top, best))
+
+
+@physics
+def crest_start(v0, v1, v2, back, first, last):
+    """Steps from the newest look to the vertex of the parabola through three neighbouring looks of one motion.
+
+    back : of the middle one, steps before the newest.  first, last : masks of lanes where it is an end of its motion,
+    beside which half a step inwards is as good a start as any.
+    """
+    bend = v0 - 2.0 * v1 + v2
+    shift = where(bend < 0.0, 0.5 * (v0 - v2) / where(bend < 0.0, bend, -1.0), 0.0)
+    return where(first, 0.5, where(last, -0.5, shift)) - back
+
+
+@physics
+def nearer_crest(x, slope, bend, low, high):
+    """One step of Newton's method to the zero of a slope that falls, within bounds."""
+    return minimum(maximum(x - where(bend < 0.0, slope / where(bend < 0.0, bend, -1.0), 0.0), low), high)
+
+
+@physics
+def is_top(v0, v1, v2):
+    """Mask: the middle one of three neighbouring values tops both, or is not a number."""
+    return not ((v1 < v0) | (v1 < v2))
+
+
+@physics
+def is_inside(x, value, v1, low, high, smooth):
+    """Mask: a value between looks is taken, not that of the look beside it."""
+    return (smooth > 0.0) & (x > low) & (x < high) & (value > v1)
+
+
+@physics
+def top(inside, value, v1):
+    return where(inside, value, v1)
+
+
+@physics
+def top_time(inside, x, back, t, h):
+    """Time [s] of x steps of h after t, where the mask holds, else of the look `back` steps before t."""
+    return t + where(inside, x, -back) * h
+
+
+@physics
+def fall_start(w1, w2, back, falling):
+    """Steps from the newest look to the zero of the chord from the look `back` steps before it."""
+    return where(falling, w1 / where(falling & (w1 > w2), w1 - w2, 1.0), 0.5) - back
+
+
+@physics
+def nearer_zero(x, value, slope, back):
+    """One step of Newton's method to the zero of a value that falls, in the step after the look `back` steps before."""
+    return minimum(maximum(x - where(slope < 0.0, value / where(slope < 0.0, slope, -1.0), 0.0), -back), 1.0 - back)
+
+
+@physics
+def later_fall(when, x, t, h, mask):
+    """Last time above zero, x steps of h [s] after t where the mask holds, if that is later."""
+    time = t + x * h
+    return where(mask & (time > when), time, when)
 
 
 @physics

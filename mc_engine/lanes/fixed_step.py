@@ -19,7 +19,7 @@ from mc_engine.lanes.history import look_shared, record_row
 from mc_engine.lanes.lane_access import unequal
 from mc_engine.lanes.philox import Draws
 from mc_engine.lanes.physics_function import physics
-from mc_engine.lanes.stage_memory import stage_memory
+from mc_engine.lanes.stage_memory import put_stage, stage_memory
 from mc_engine.lanes.tuples import (
     add_scaled,
     any_field,
@@ -36,12 +36,18 @@ from mc_engine.lanes.tuples import (
 from mc_engine.status import EVENT_LIMIT, NO_STOP, NOT_FINITE
 
 # How a state is taken along the grid.  `past` is what a method knows of earlier steps; `tables` are its numbers.
-# begin(tables, memory, s, t) : past of the first state; memory : room for `MOST_SLOPES` derivatives
+# begin(tables, memory, looks, s, t) : past of the first state; memory : room for `MOST_SLOPES` derivatives
 # restart(past, lanes) : past without the earlier steps of some lanes, whose discrete state has changed
 # advance(f, tables, past, t, finish, h, s, m, p, o, flying) : (state at the end of a grid step, past)
 # single(f, tables, t, h, s, m, p, o) : state after a step of length h [s], lanes, from a state alone
-Method = namedtuple("Method", "begin restart advance single tables")
+# track(past, number, closing, lanes, h, smooth, seen, times, lasts, best, when, last) : running extrema and past after
+# one more look at the outputs, the `number`th of the flight, the newest of `seen`; closing : it is the last of `lanes`
+Method = namedtuple("Method", "begin restart advance single track tables")
 MOST_SLOPES = 11
+# What a multistep method keeps of the tracked outputs at the last grid points, the latest of number n in place
+# n % LOOKS, and room for their differences.  count : how many looks the motion had that the latest look belonged to
+Looks = namedtuple("Looks", "peaks peak_differences lasts last_differences count")
+LOOKS = 9
 
 _OVERRUN, _BROKEN, _UNSTOPPED = float(EVENT_LIMIT), float(NOT_FINITE), float(NO_STOP)
 
@@ -66,7 +72,7 @@ rk4 = compile_inline(_rk4)
 single = compile_callable(_rk4)
 
 
-def _begin(tables, memory, s, t):
+def _begin(tables, memory, looks, s, t):
     """RK4 knows nothing of earlier steps."""
     return 0
 
@@ -82,22 +88,41 @@ def _advance(f, tables, past, t, finish, h, s, m, p, o, flying):
 begin, restart, advance = compile_inline(_begin), compile_inline(_restart), compile_inline(_advance)
 
 
-def _track(flying, smooth, seen, times, lasts, best, when, last):
-    """Running extrema after one more look at the outputs; the newest look is the last of `seen`."""
+def _track_by_three(lanes, chords, smooth, seen, times, lasts, best, when, last):
+    """Running extrema after one more look, by the parabola through three looks; last times by a chord in `chords`."""
     v0, v1, v2 = seen
     t0, t1, t2 = times
-    crests = flying & any_field(map_fields(extrema.crest, v0, v1, v2, best))
+    crests = lanes & any_field(map_fields(extrema.crest, v0, v1, v2, best))
     if any_lane(crests):
         when = map_fields(extrema.crest_time, when, best, v0, v1, v2, t0, t1, t2, smooth, crests)
         best = map_fields(extrema.crest_value, best, when, v0, v1, v2, t0, t1, t2, smooth, crests)
     w1, w2 = lasts
-    last = map_fields(extrema.above, last, w2, t2, flying)
-    if any_lane(any_field(map_fields(extrema.falls, w1, w2, flying))):
-        last = map_fields(extrema.fall_time, last, w1, w2, t1, t2, flying)
+    last = map_fields(extrema.above, last, w2, t2, lanes)
+    if any_lane(any_field(map_fields(extrema.falls, w1, w2, chords))):
+        last = map_fields(extrema.fall_time, last, w1, w2, t1, t2, chords)
     return best, when, last
 
 
+track_by_three = compile_inline(_track_by_three)
+
+
+def _track(past, number, closing, lanes, h, smooth, seen, times, lasts, best, when, last):
+    return *track_by_three(lanes, lanes, smooth, seen, times, lasts, best, when, last), past
+
+
 track = compile_inline(_track)
+
+
+def _looks_from(v, w, t):
+    """Looks of a flight that begins, with the first in every place."""
+    peaks, lasts = stage_memory(v, LOOKS), stage_memory(w, LOOKS)
+    for place in range(LOOKS):
+        put_stage(peaks, place, v)
+        put_stage(lasts, place, w)
+    return Looks(peaks, stage_memory(v, LOOKS), lasts, stage_memory(w, LOOKS), 0.0 * t)
+
+
+looks_from = compile_inline(_looks_from)
 
 
 def _step(f, method, past, has_events, t, finish, h, s, m, p, o, flying, history, rows):
@@ -141,7 +166,7 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
     w1 = f.lasts_of(seen)
     when, last = map_fields(extrema.first_time, v1, t), map_fields(extrema.first_time, w1, t)
     t0 = t1 = t2 = t
-    past = method.begin(method.tables, stage_memory(s, MOST_SLOPES), s, t)
+    past = method.begin(method.tables, stage_memory(s, MOST_SLOPES), looks_from(v1, w1, t), s, t)
     last_memory = m
     for k in range(n_steps):
         recorded = history.shape[0] > 0 and k % stride == 0
@@ -153,7 +178,8 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
             m = held  # of lanes that have ended, too: what they held then is in `last_memory`
         seen = spread(f.observe(t2, s, m, p, o), t)
         v2, w2 = f.peaks_of(seen), f.lasts_of(seen)
-        best, when, last = track(flying, f.smooth_of(v2), (v0, v1, v2), (t0, t1, t2), (w1, w2), best, when, last)
+        smooth, values, times, lasts = f.smooth_of(v2), (v0, v1, v2), (t0, t1, t2), (w1, w2)
+        best, when, last, past = method.track(past, k, False, flying, h, smooth, values, times, lasts, best, when, last)
         if recorded:  # looked at anew: so the outputs that only a history wants cost nothing where there is none
             record_row(f, history, rows, flying, t2, s, m, p, o)
         # the grid's own time, not a sum of steps: no rounding piles up, and a sample falls where it belongs
@@ -173,7 +199,10 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
             last_memory = select(at_end | broken, m, last_memory)
             seen = look_shared(f, t, s, m, p, o)
             v3, w3 = f.peaks_of(seen), f.lasts_of(seen)
-            best, when, last = track(at_end, f.smooth_of(v3), (v1, v2, v3), (t1, t2, t), (w2, w3), best, when, last)
+            values, times, lasts = (v1, v2, v3), (t1, t2, t), (w2, w3)
+            best, when, last, _ = method.track(
+                past, k + 1, True, at_end, h, smooth, values, times, lasts, best, when, last
+            )
             when = map_fields(extrema.end_time, when, best, v3, t, at_end, t)
             best = map_fields(extrema.end_value, best, v3, at_end)
             if history.shape[0] > 0:

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from mc_engine.lanes.compiler import compile_inline
-from mc_engine.lanes.functions import any_lane, fma, where
+from mc_engine.lanes.functions import any_lane, fma, replace, where
 from mc_engine.lanes.lane_access import differ
 from mc_engine.lanes.multistep import ring_columns, single
 from mc_engine.lanes.physics_function import physics
@@ -39,8 +39,8 @@ from mc_engine.lanes.tuples import add_scaled, first_fields, joined, map_fields,
 # accelerations : at the last grid points, in a ring;  newest : index of the last in it
 # known : how many of them belong to the present motion, of each lane
 # first, second : sums of the accelerations, times the step [m/s], and of these sums, times the step [m]
-# first_lost, second_lost : rounding errors of the sums so far
-Past = namedtuple("Past", "accelerations newest known first second first_lost second_lost")
+# first_lost, second_lost : rounding errors of the sums so far;  looks : see `mc_engine.lanes.fixed_step`
+Past = namedtuple("Past", "accelerations newest known first second first_lost second_lost looks")
 
 
 def sum_weights(n: int, predicted: bool) -> tuple[list[Fraction], list[Fraction]]:
@@ -107,14 +107,13 @@ def _lost(y, end, change):
     return (end - y) - change
 
 
-def _begin(tables, memory, s, t):
+def _begin(tables, memory, looks, s, t):
     none = tables[-2](map_fields(_none, s))
-    return Past(memory, 0, 0.0 * t, none, none, none, none)
+    return Past(memory, 0, 0.0 * t, none, none, none, none, looks)
 
 
 def _restart(past, lanes):
-    known = where(lanes, 0.0, past.known)
-    return Past(past.accelerations, past.newest, known, past.first, past.second, past.first_lost, past.second_lost)
+    return replace(past, known=where(lanes, 0.0, past.known))
 
 
 begin, restart = compile_inline(_begin), compile_inline(_restart)
@@ -158,7 +157,7 @@ def _advance(f, tables, past, t, finish, h, s, m, p, o, flying):
         end = first_fields(in_order(joined(positions, rates)), s)
     if any_lane(starting):
         end = select(starting, single(f, tables, t, 0.0 * t + h, s, m, p, o), end)
-    return end, Past(past.accelerations, newest, known, first, second, first_lost, second_lost)
+    return end, Past(past.accelerations, newest, known, first, second, first_lost, second_lost, past.looks)
 
 
 advance = compile_inline(_advance)

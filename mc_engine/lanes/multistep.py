@@ -8,6 +8,8 @@ lane anew that has met an event, or whose discrete state a sample of the control
 The methods are stable for short steps only.  An oscillation of w rad/s grows unless step times w is below 0.37, 0.26,
 0.18, 0.12, 0.08 for orders 8 to 12 (measured in tests/mc_engine/lanes/test_multistep.py).
 
+Outputs between grid points lie on the polynomial through the last looks at them, by their differences.
+
 E. Hairer, S. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., section III.1; a corrector one
 order above the predictor: L. Shampine, M. Gordon, Computer Solution of Ordinary Differential Equations (1975); the
 compensated sum of the steps: O. Moller, BIT 5 (1965) 37-50.
@@ -19,18 +21,22 @@ from typing import Any
 
 import numpy as np
 
+from mc_engine.lanes import extrema
 from mc_engine.lanes.adaptive_step import attempt
 from mc_engine.lanes.compiler import compile_callable, compile_inline
-from mc_engine.lanes.functions import any_lane, where
+from mc_engine.lanes.fixed_step import LOOKS, track_by_three
+from mc_engine.lanes.functions import any_lane, replace, where
 from mc_engine.lanes.physics_function import physics
 from mc_engine.lanes.runge_kutta_pairs import DOP853, LARGEST_STAGES
-from mc_engine.lanes.stage_memory import put_stage, stage_memory, stage_sum
-from mc_engine.lanes.tuples import add_scaled, map_fields, select, spread
+from mc_engine.lanes.stage_memory import put_stage, stage_memory, stage_sum, take_stage
+from mc_engine.lanes.tuples import add_scaled, any_field, map_fields, select, spread
+
+_ITERATIONS = 3  # of Newton's method between two looks, from a parabola or a chord
 
 # differences : of neighbouring slopes at the last grid points, in a ring;  newest : index of the last in it
 # slope : at the last grid point;  known : how many slopes belong to the present motion, of each lane
-# lost : rounding error of the sum of the steps so far
-Past = namedtuple("Past", "differences newest slope known lost")
+# lost : rounding error of the sum of the steps so far;  looks : see `mc_engine.lanes.fixed_step`
+Past = namedtuple("Past", "differences newest slope known lost looks")
 
 
 def adams_weights(order: int, implicit: bool) -> list[Fraction]:
@@ -108,13 +114,13 @@ def _lost(y, end, change):
     return (end - y) - change
 
 
-def _begin(tables, memory, s, t):
+def _begin(tables, memory, looks, s, t):
     none = map_fields(_none, s)
-    return Past(memory, 0, none, 0.0 * t, none)
+    return Past(memory, 0, none, 0.0 * t, none, looks)
 
 
 def _restart(past, lanes):
-    return Past(past.differences, past.newest, past.slope, where(lanes, 0.0, past.known), past.lost)
+    return replace(past, known=where(lanes, 0.0, past.known))
 
 
 begin, restart = compile_inline(_begin), compile_inline(_restart)
@@ -153,7 +159,190 @@ def _advance(f, tables, past, t, finish, h, s, m, p, o, flying):
     if any_lane(starting):
         end = select(starting, single(f, tables, t, 0.0 * t + h, s, m, p, o), end)
         lost = select(starting, map_fields(_none, s), lost)
-    return end, Past(past.differences, newest, slope, known, lost)
+    return end, Past(past.differences, newest, slope, known, lost, past.looks)
 
 
 advance = compile_inline(_advance)
+
+
+# ---- extremes and zeros of outputs between grid points, on the polynomial through the last looks at one motion
+
+
+@physics
+def _at_corner(smooth, corner):
+    return where(corner, smooth, 0.0)
+
+
+@physics
+def _smooth_crest(v0, v1, v2, best, smooth):
+    return (smooth > 0.0) & extrema.crest(v0, v1, v2, best)
+
+
+@physics
+def _kept(difference, mask):
+    return where(mask, difference, 0.0)
+
+
+@physics
+def _next_value(difference, value, ahead, part):
+    return difference + part * (ahead * value)
+
+
+@physics
+def _next_slope(value, slope, ahead, part):
+    return part * (value + ahead * slope)
+
+
+@physics
+def _next_bend(slope, bend, ahead, part):
+    return part * (2.0 * slope + ahead * bend)
+
+
+def _form_differences(ring, differences, newest, like):
+    """Backward differences of the looks in a ring, at the newest, by their order."""
+    for i in range(LOOKS):
+        put_stage(differences, i, take_stage(ring, (newest + LOOKS - i) % LOOKS, like))
+    for order in range(1, LOOKS):
+        for i in range(LOOKS - 1, order - 1, -1):
+            newer, older = take_stage(differences, i - 1, like), take_stage(differences, i, like)
+            put_stage(differences, i, map_fields(_difference, newer, older))
+
+
+form_differences = compile_callable(_form_differences)
+
+
+def _interpolate(differences, count, x):
+    """Value, slope and curvature, per step, of the polynomial through `count` looks, x steps after the newest.
+
+    Newton's backward formula, D0 + x (D1 + (x + 1) / 2 (D2 + (x + 2) / 3 (D3 + ...))), with its derivatives.
+    E. Hairer, S. Norsett, G. Wanner, section III.1.
+    """
+    value = map_fields(_none, x)
+    slope = bend = value
+    for i in range(LOOKS):
+        order = LOOKS - 1 - i
+        part, ahead = 1.0 / float(order + 1), map_fields(_plus, x, float(order))
+        bend = map_fields(_next_bend, slope, bend, ahead, part)
+        slope = map_fields(_next_slope, value, slope, ahead, part)
+        difference = map_fields(_kept, take_stage(differences, order, x), count > float(order))
+        value = map_fields(_next_value, difference, value, ahead, part)
+    return value, slope, bend
+
+
+interpolate = compile_callable(_interpolate)
+
+
+def _search_crest(looks, newest, back, t, h, count, lanes, smooth, best, when):
+    """(best, when) with the crests beside the look that is `back` steps before the newest, at t."""
+    place, newer, older = (newest - back) % LOOKS, (newest - max(back - 1, 0)) % LOOKS, (newest - back - 1) % LOOKS
+    v1, v2, middle = take_stage(looks.peaks, place, best), take_stage(looks.peaks, newer, best), 0.0 * t + float(back)
+    first, final = middle + 1.0 >= count, middle < 1.0
+    v0 = select(first, v1, take_stage(looks.peaks, older, best))
+    crests = lanes & any_field(map_fields(extrema.is_top, v0, v1, v2))
+    if any_lane(crests):
+        low, high = where(first, 0.0, -1.0) - middle, where(final, 0.0, 1.0) - middle
+        x = map_fields(extrema.crest_start, v0, v1, v2, middle, first, final)
+        for _ in range(_ITERATIONS):
+            _, slope, bend = interpolate(looks.peak_differences, count, x)
+            x = map_fields(extrema.nearer_crest, x, slope, bend, low, high)
+        value, _, _ = interpolate(looks.peak_differences, count, x)
+        inside = map_fields(extrema.is_inside, x, value, v1, low, high, smooth)
+        top = map_fields(extrema.top, inside, value, v1)
+        time = map_fields(extrema.top_time, inside, x, middle, t, h)
+        when = map_fields(extrema.end_time, when, best, top, time, crests, t)
+        best = map_fields(extrema.end_value, best, top, crests)
+    return best, when
+
+
+search_crest = compile_inline(_search_crest)
+
+
+def _search_fall(looks, newest, back, t, h, count, lanes, last):
+    """Last times above zero, with the falls between the look that is `back` steps before the newest and the next."""
+    w1 = take_stage(looks.lasts, (newest - back) % LOOKS, last)
+    w2 = take_stage(looks.lasts, (newest - max(back - 1, 0)) % LOOKS, last)
+    falls = map_fields(extrema.falls, w1, w2, lanes)
+    if any_lane(any_field(falls)):
+        form_differences(looks.lasts, looks.last_differences, newest, last)
+        middle = 0.0 * t + float(back)
+        x = map_fields(extrema.fall_start, w1, w2, middle, lanes)
+        for _ in range(_ITERATIONS):
+            value, slope, _ = interpolate(looks.last_differences, count, x)
+            x = map_fields(extrema.nearer_zero, x, value, slope, middle)
+        last = map_fields(extrema.later_fall, last, x, t, h, falls)
+    return last
+
+
+search_fall = compile_inline(_search_fall)
+
+
+def _search(looks, number, t, h, count, closing, lanes, smooth, best, when, last):
+    """Running extrema after a search on the polynomial: beside the look before the newest; beside all before in lanes
+    that have just got the looks for it; if `closing` beside the newest, and beside all where looks are fewer.
+
+    number, t : of the newest look, its time [s];  count : how many looks its motion has had
+    """
+    newest, nearest = number % LOOKS, 0 if closing else 1
+    form_differences(looks.peaks, looks.peak_differences, newest, best)
+    everywhere = lanes & ((count < float(LOOKS)) if closing else (count == float(LOOKS)))
+    for i in range(LOOKS - nearest):
+        back = LOOKS - 1 - i
+        mask = (lanes if back == nearest else everywhere) & (count > float(back))
+        if any_lane(mask):
+            best, when = search_crest(looks, newest, back, t, h, count, mask, smooth, best, when)
+            last = search_fall(looks, newest, back, t, h, count, mask, last)
+    return best, when, last
+
+
+# off the main path: one copy in the kernel, called where needed
+search = compile_callable(_search)
+
+
+def _track_by_all(looks, number, closing, lanes, count, h, smooth, seen, times, lasts, best, when, last):
+    """Running extrema after a look that may change them, or that belongs to a motion of few looks.
+
+    count : how many looks the motion has had, this one included
+    """
+    ended = lanes & (count <= looks.count) & (looks.count >= 3.0)
+    if any_lane(ended):
+        best, when, last = search(looks, number - 1, times[1], h, looks.count, True, ended, smooth, best, when, last)
+    put_stage(looks.peaks, number % LOOKS, seen[2])
+    put_stage(looks.lasts, number % LOOKS, lasts[1])
+    # around the end of a motion three looks have to do
+    corner, v0, v1, v2 = map_fields(_at_corner, smooth, count < 3.0), seen[0], seen[1], seen[2]
+    best, when, last = track_by_three(lanes, lanes & (count < 2.0), corner, seen, times, lasts, best, when, last)
+    crests = any_field(map_fields(_smooth_crest, v0, v1, v2, best, smooth))
+    falls = any_field(map_fields(extrema.falls, lasts[0], lasts[1], lanes))
+    wanted = lanes & ((count == float(LOOKS)) | ((crests | falls) & (count > float(LOOKS))))
+    if any_lane(wanted):
+        best, when, last = search(looks, number, times[2], h, count, False, wanted, smooth, best, when, last)
+    closed = lanes & (count >= 3.0)
+    if closing and any_lane(closed):
+        best, when, last = search(looks, number, times[2], h, count, True, closed, smooth, best, when, last)
+    return best, when, last
+
+
+track_by_all = compile_callable(_track_by_all)
+
+
+def _track(past, number, closing, lanes, h, smooth, seen, times, lasts, best, when, last):
+    """Running extrema and past after one more look, see `Method`; it is of the motion that its slope will be of."""
+    looks, count, v0, v1, v2 = past.looks, past.known + 1.0, seen[0], seen[1], seen[2]
+    crests = lanes & any_field(map_fields(extrema.crest, v0, v1, v2, best))
+    if any_lane(crests):  # of outputs with corners that is all
+        when = map_fields(extrema.end_time, when, best, v1, times[1], crests, best)
+        best = map_fields(extrema.end_value, best, v1, crests)
+    smooth_crests = any_field(map_fields(_smooth_crest, v0, v1, v2, best, smooth))
+    falls = any_field(map_fields(extrema.falls, lasts[0], lasts[1], lanes))
+    if closing or any_lane(lanes & (smooth_crests | falls | (count <= float(LOOKS)))):
+        best, when, last = track_by_all(
+            looks, number, closing, lanes, count, h, smooth, seen, times, lasts, best, when, last
+        )
+    else:
+        put_stage(looks.peaks, number % LOOKS, v2)
+        put_stage(looks.lasts, number % LOOKS, lasts[1])
+        last = map_fields(extrema.above, last, lasts[1], times[2], lanes)
+    return best, when, last, replace(past, looks=replace(looks, count=count))
+
+
+track = compile_inline(_track)

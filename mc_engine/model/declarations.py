@@ -49,7 +49,7 @@ def maximum_of(output: str, description: str = "", *, smooth: bool = True, **opt
 
     output : str, the name of an output
     description : str, one line; by default in the words of the output
-    smooth : bool, between steps the extremum is that of a parabola; an output with corners is taken at the steps
+    smooth : bool, the extremum may lie between steps, on a curve through them; else it is taken at the steps
     options : low, high, sometimes, unit; see `Field`
 
     Returns the Metric, for `metrics`.

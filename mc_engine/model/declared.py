@@ -262,7 +262,12 @@ def _call(name: str, what: str, function: Any, kept: Memory) -> Call:
     in_phase = ["since", "phase"] if kept.phases and {"t", "m"} <= {*given} else []
     calls: list[Call] = []
     chosen: list[Pick] = []
+    taken = [*inspect.signature(function).parameters]
     for argument in inspect.signature(function).parameters.values():
+        if known.get(argument.name) in {*taken} - {argument.name}:
+            raise ModelError(
+                f'{what} takes "{known[argument.name]}" and "{argument.name}", which are the same; take one'
+            )
         if argument.name in known:
             chosen.append(("argument", given.index(known[argument.name]), ""))
         elif argument.name in in_phase:

@@ -50,8 +50,8 @@ class Backend:
         if self.scheduler is not None and self.name != "dask":
             raise EngineError(f'a scheduler is for the backend "dask", not for "{self.name}"')
         limited = self.case_seconds is not None or self.memory_mib is not None
-        if self.name in ("threading", "cuda", "auto") and limited:
-            raise EngineError('a thread cannot be limited in time or memory; fly with the backend "loky"')
+        if limited and (flown_by := {"threading": "a thread", "cuda": "a card", "auto": "a card"}.get(self.name)):
+            raise EngineError(f'{flown_by} cannot be limited in time or memory; fly with the backend "loky"')
         if self.scheduler is not None and self.memory_mib is not None:
             raise EngineError("the workers of a scheduler have limits of their own: `dask worker --memory-limit`")
         if self.patience_s is not None and self.name != "dask":

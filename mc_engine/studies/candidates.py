@@ -41,7 +41,7 @@ class Scores:
 
     @property
     def violation(self) -> np.ndarray:
-        """float64[n]: 0 for a candidate inside all limits; infinite for one without a number for every metric."""
+        """float64[n]: 0 for a candidate that meets all constraints; infinite where not every metric is a number."""
         total = self.excess.sum(axis=1)
         return np.where(np.isfinite(total) & np.isfinite(self.objectives).all(axis=1), total, np.inf)
 

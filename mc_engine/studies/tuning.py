@@ -208,7 +208,7 @@ def _evaluations(
         *(_measure_column(campaign, objective, "objective") for objective in tuning.objectives),
         *(_measure_column(campaign, constraint, "constraint") for constraint in tuning.constraints),
         Column("violation", "", "candidate", "how far beyond the limits, in shares of them, added up"),
-        Column("feasible", "", "candidate", "whether it is inside all limits", "switch"),
+        Column("feasible", "", "candidate", "whether all its measures are numbers that meet the constraints", "switch"),
         Column("failed_cases", "", "candidate", "its cases that did not complete", "integer"),
         Column("commonest_failure", "", "candidate", "how and why most of these ended", "word"),
     ]
@@ -245,7 +245,7 @@ def _generations(flown: list[Generation], ended: bool) -> tuple[list[Column], di
     columns = [
         Column("generation", "", "generation", "number of the generation, from 0", "integer"),
         Column("evaluations", "", "generation", "candidates flown so far", "integer"),
-        Column("feasible_so_far", "", "generation", "of these, how many are inside all limits", "integer"),
+        Column("feasible_so_far", "", "generation", "of these, how many are feasible", "integer"),
         Column("front_size", "", "generation", "candidates on the front of all so far", "integer"),
         Column("least_violation", "", "generation", "smallest violation so far; 0 where a candidate is feasible"),
         Column("dominated_share", "", "generation", "fraction of the box of all fronts that this front dominates"),

@@ -41,9 +41,9 @@ def no_contributors(flown: Flown, silent: list[str]) -> Iterator[str]:
 def _effect_figure(flown: Flown, contributions: Contributions, shown: list[str]) -> FigureBlock:
     used = [contributions.n_used[metric] for metric in shown]
     few, most = min(used), max(used)
-    blocks = f"{count(most)}" if few == most else f"{count(few)} to {count(most)}"
-    of = f"{blocks} of {count(contributions.n_tried)}"
-    source = f"from {of} blocks" if contributions.trends is None else f"from a surrogate model of {of} cases"
+    of = f"{count(few)}{f' to {count(most)}' * (few != most)} of {count(contributions.n_tried)}"
+    of_blocks = f"{of} blocks of cases flown for this purpose"
+    source = f"from {of_blocks}" if contributions.trends is None else f"from a surrogate model of {of} cases"
     return contributor_figure(flown, [(flown.words(item), contributions.by_metric[item]) for item in shown], source)
 
 
@@ -133,10 +133,12 @@ def _note(flown: Flown, contributions: Contributions, shown: list[str]) -> str:
         )
         return (
             f"From {count(contributions.flights)} cases in {count(contributions.n_tried)} blocks, flown for this "
-            f"purpose and in no other statistic. {each} Pick-freeze estimates (Janon 2014, Jansen 1999). A total "
-            "effect is the variance that remains, on average, when all other inputs are known; where inputs interact, "
-            "the variance falls by another amount if the input is held at its nominal value. First-order and total "
-            "effects and their intervals are within 0 to 1."
+            "purpose and in no other statistic; a block is some independent cases, and copies of the first that each "
+            "take one contributor from another. "
+            f"{each} Pick-freeze estimates (Janon 2014, Jansen 1999). A total effect is the variance that remains, on "
+            "average, when all other inputs are known; where inputs interact, the variance falls by another amount if "
+            "the input is held at its nominal value. First-order and total effects and their intervals are within 0 "
+            "to 1."
         ) + (reduction if contributions.held else "")
     unexplained = (
         "Unexplained: fraction that the surrogate model behind the total effects attributes to no input (random "

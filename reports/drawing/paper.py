@@ -5,6 +5,7 @@ All lengths are points.  The typesetter sets the text in the typeface of the pag
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -26,14 +27,16 @@ Ends = tuple[float, float]
 
 def svg(drawing: Drawing) -> str:
     """The figure as SVG on a transparent ground; the same figure gives the same bytes."""
-    parts = list(_panel_rows(drawing, WIDTH))
-    return _picture([line for body, _ in parts for line in body], 0.0, parts[-1][1], WIDTH)
+    key, top = _key(drawing.key, WIDTH)
+    parts = list(_panel_rows(drawing, WIDTH, top))
+    return _picture([*key, *(line for body, _ in parts for line in body)], 0.0, parts[-1][1], WIDTH)
 
 
 def strips(drawing: Drawing, width: float = WIDTH) -> list[str]:
-    """One SVG for each row of panels, so that a figure can continue on the next page; the first holds the key."""
-    pictures, top = [], 0.0
-    for body, bottom in _panel_rows(drawing, width):
+    """The key, "" without one, and an SVG for each row of panels, so that a figure can continue on the next page."""
+    body, top = _key(drawing.key, width)
+    pictures = [_picture(body, 0.0, top, width) if body else ""]
+    for body, bottom in _panel_rows(drawing, width, top):
         pictures.append(_picture(body, top, bottom, width))
         top = bottom
     return pictures
@@ -48,13 +51,13 @@ def _picture(body: list[str], top: float, bottom: float, width: float) -> str:
     return coloured("".join([head, *body, "</svg>"]), ON_PAPER)
 
 
-def _panel_rows(drawing: Drawing, whole: float) -> Iterator[tuple[list[str], float]]:
-    """SVG elements of each row of panels and the y of its lower edge; the first row has the key above it."""
-    body, top = _key(drawing.key, whole)
+def _panel_rows(drawing: Drawing, whole: float, top: float) -> Iterator[tuple[list[str], float]]:
+    """SVG elements of each row of panels, from `top` downwards, and the y of its lower edge."""
     rows = -(-len(drawing.plots) // drawing.across)
     for number, row in enumerate(np.array_split(np.arange(len(drawing.plots)), rows)):
         width = (whole - GAP * (len(row) - 1)) / len(row)
-        panels = []
+        panels: list[_Panel] = []
+        body: list[str] = []
         for k, plot in enumerate(drawing.plots[row[0] : row[-1] + 1]):
             left = (GAP + width) * k
             scales = [_colour_scale(field, plot.height) for field in plot.fields]
@@ -67,7 +70,6 @@ def _panel_rows(drawing: Drawing, whole: float) -> Iterator[tuple[list[str], flo
             body += panel.drawn(top, upper, lower, f"c{number}-{k}")
         top = lower + max(panel.foot for panel in panels) + 6.0
         yield body, top
-        body = []
 
 
 def _colour_scale(field: Field, height: float) -> Plot:
@@ -120,13 +122,14 @@ def _ticks(axis: Axis, ends: Ends, room: float, upright: bool) -> _Ticks:
         return _own_ticks([(at, text) for at, text in axis.ticks if min(ends) <= at <= max(ends)], room, upright)
     many = [axis_ticks(*ends, most, log=axis.log, whole=axis.whole) for most in range(MOST_TICKS, 1, -1)]
     outermost = many[0][:: max(len(many[0]) - 1, 1)]  # one tick alone says nothing of a scale
-    for places in [*(some for some in many if len(some) > 1), outermost]:
+    choices = [*(some for some in many if len(some) > 1), outermost]
+    for turned, places in product((False, not upright), choices):
         texts, power = numerals(places, axis.log)
         apart = np.abs(np.diff(part_of_axis(np.array(places), ends, axis.log))) * room
-        sizes = np.array([UPRIGHT if upright else lettering.width(text) + BETWEEN for text in texts])
+        sizes = np.array([UPRIGHT if upright or turned else lettering.width(text) + BETWEEN for text in texts])
         if (apart >= 0.5 * (sizes[1:] + sizes[:-1])).all():
             break
-    return _Ticks(np.array(places), [[text] for text in texts], power)
+    return _Ticks(np.array(places), [[text] for text in texts], power, turned)
 
 
 def _own_ticks(own: list[tuple[float, str]], room: float, upright: bool) -> _Ticks:

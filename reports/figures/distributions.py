@@ -8,7 +8,7 @@ import numpy as np
 from mc_engine.statistics import Quantile, Summary
 from reports.drawing.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot
 from reports.drawing.palette import BLUE, GREEN, INK, ORANGE, SKY, VERMILION
-from reports.text.numbers import count, interval, limit_number, number, percent
+from reports.text.numbers import count, counted, interval, limit_number, number, percent
 
 FEWEST_BINS, MOST_BINS = 8, 48
 CENTRAL = (0.005, 0.995)  # what a histogram must show well
@@ -49,7 +49,7 @@ def histogram(
     bottom = np.zeros(counts.size)
     marks.append(Bar(edges[:-1], edges[1:], bottom, counts, SKY, texts=texts, column=column, key="cases"))
     marks += _percentile_lines(drawn, outer, with_intervals)
-    beyond = [count(values.size - int(counts.sum()))] if counts.sum() < values.size else []
+    beyond = [counted(values.size - int(counts.sum()), "case")] if counts.sum() < values.size else []
     known = [] if nominal is None else [nominal]
     for places, words, key, colour, dash in (
         (known, "nominal", "nominal", INK, "dot"), (limits, "limit", "required limit", VERMILION, "solid"),

@@ -82,8 +82,9 @@ def _lone(block: Block) -> bool:
 def _plain_block(block: Block, width: float = paper.WIDTH) -> dict[str, Any]:
     if isinstance(block, FigureBlock):
         drawing = block.drawing
-        strips = paper.strips(drawing, width)
-        body: dict[str, Any] = {"caption": block.caption, "alternative": drawing.alternative, "strips": strips}
+        key, *strips = paper.strips(drawing, width)
+        body: dict[str, Any] = {"caption": block.caption, "alternative": drawing.alternative, "key": key}
+        body["strips"] = strips
     else:
         block = unbroken(block) if isinstance(block, Table) else block
         body = asdict(block)

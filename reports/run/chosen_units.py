@@ -191,7 +191,7 @@ class ShownRun(Flown):
 
 
 def spread_text(flown: Flown, metric: str, spread: float) -> str:
-    """A part of a metric's σ in the unit that suits σ: 55 s of a time that is told in days."""
+    """A part of a metric's σ in its own unit where that suits σ better: 55 s of a time that is told in days."""
     told, sigma = flown.unit(metric), flown.summaries[metric].spread
-    unit = chosen_unit(told, [sigma]) if sigma and sigma < FINE else told
+    unit = flown.own.unit(metric) if sigma and sigma < FINE else told
     return with_unit(number(convert(spread, told, unit) if unit != told else spread, 3), unit)

@@ -169,7 +169,7 @@ def _distribution_plot(flown: Flown, name: str, height: float) -> Plot:
         values[np.isfinite(values)],
         flown.axis(name),
         summary,
-        flown.stated.outer,
+        flown.stated.outer if flown.random else (),
         title=used,
         nominal=flown.nominal_value(name),
         limits=sorted(limits),

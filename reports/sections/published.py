@@ -38,8 +38,6 @@ from reports.text.numbers import count, counted, exact, number, with_unit
 
 TONES = {REACHED: "good", CLOSE: "good", IMPROVED: "good", NOT_REACHED: "open", UNKNOWN: ""}
 
-TONES = {REACHED: "good", CLOSE: "good", IMPROVED: "good", NOT_REACHED: "open", UNKNOWN: ""}
-
 
 def published_blocks(flown: Flown) -> Iterator[Table | Text | str]:
     """Published values beside those that this run computes; of the others, how many there are."""

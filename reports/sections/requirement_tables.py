@@ -154,8 +154,8 @@ def risk_table(flown: Flown) -> Table | None:
     if len(flown.verdicts) > 1:
         note += (
             "With confidence shared: the verdict if all verdicts together are to hold with their confidence, each "
-            f"taking 1/{len(judged)} of the error allowed (Bonferroni). That every requirement is met needs no such "
-            "sharing (Berger 1982)."
+            f"taking 1/{len(judged)} of the error allowed (Bonferroni). The verification matrix needs no such sharing: "
+            "all requirements are met where each is, by a test with its full confidence (Berger 1982)."
         )
     else:
         columns, rows = columns[:-1], tuple(row[:-1] for row in rows)

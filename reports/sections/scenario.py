@@ -55,13 +55,17 @@ def _design_words(flown: Flown) -> str:
 
 
 def timeline_table(flown: Flown) -> Table | None:
-    """The phases of the nominal case and the events whose times the metrics tell, in their order; None without any."""
+    """The phases of the nominal case and the events whose times the metrics tell, in their order; None without any.
+
+    An event at 0 s is none of its own: an error that is largest as the flight begins, or one that never settles.
+    """
     times = {}
     for fact in flown.with_role("metric"):
         words, value = flown.words(fact.name), flown.own.nominal_value(fact.name)
         is_event = words.endswith(" time") or fact.description.startswith(EVENTS)
         if value is not None and _is_time(flown.own.unit(fact.name)) and is_event:
             times[fact.name] = words.removesuffix(" time")
+    at_start = [times.pop(name) for name in [*times] if _seconds(flown, name) == 0.0]
     phases = phase_times(flown)
     if not times and not phases:
         return None
@@ -87,7 +91,8 @@ def timeline_table(flown: Flown) -> Table | None:
         Column("1σ of the cases", "number"),
         Column("Nominal values at the event", "text"),
     )
-    return Table("Timeline of the nominal case", columns, tuple(rows))
+    note = f"At 0 s in the nominal case, and not listed: {', '.join(at_start)}." * bool(at_start)
+    return Table("Timeline of the nominal case", columns, tuple(rows), note)
 
 
 def _phase_row(flown: Flown, place: int, name: str, time: float) -> tuple[Cell, ...]:

@@ -37,7 +37,7 @@ def limit_text(verdict: Verdict, unit: str) -> str:
 
 
 def summary_table(flown: Flown) -> Table:
-    """Moments and range of every metric that has a number, beside its nominal value."""
+    """Moments and range of every metric that has a number, beside its nominal value; the shape of a random sample."""
     columns = (
         Column("Metric", "text"),
         Column("Used / tried", "number"),
@@ -46,7 +46,7 @@ def summary_table(flown: Flown) -> Table:
         Column("Std. dev.", "number"),
         Column("Smallest", "number"),
         Column("Largest", "number"),
-        Column("Shape", "text"),
+        *((Column("Shape", "text"),) if flown.random else ()),
     )
     rows = []
     for name, summary in flown.summaries.items():
@@ -57,13 +57,14 @@ def summary_table(flown: Flown) -> Table:
         cells += [(summary.sd, "0" if summary.constant and summary.sd else number(summary.sd, scale=summary.spread))]
         cells += [(value, number(value, scale=summary.spread)) for value in (summary.minimum, summary.maximum)]
         used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
-        rows.append(
-            (metric_cell(flown, name), used, *(Cell(text, value) for value, text in cells), shape_cell(summary))
+        shape = [shape_cell(summary)] if flown.random else []
+        rows.append((metric_cell(flown, name), used, *(Cell(text, value) for value, text in cells), *shape))
+    note = "Used / tried: cases with a number, of all cases flown."
+    if flown.random:
+        note += (
+            " Shape: skewness and excess kurtosis, both 0 for a normal distribution; “not normal” where they and the "
+            "D’Agostino–Pearson test agree."
         )
-    note = (
-        "Used / tried: cases with a number, of all cases flown. Shape: skewness and excess kurtosis, both 0 for a "
-        "normal distribution; “not normal” where they and the D’Agostino–Pearson test agree."
-    )
     return Table("Statistics of the metrics", columns, tuple(rows), note)
 
 

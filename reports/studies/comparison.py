@@ -30,10 +30,11 @@ from reports.run.chosen_units import ShownRun, chosen_unit
 from reports.run.flown import Flown, Run
 from reports.studies.comparison_figure import change_figure
 from reports.studies.comparison_overlays import overlay_blocks
-from reports.text.numbers import axis_label, count, fixed, number, percent, words
+from reports.text.numbers import SPACE, axis_label, count, fixed, number, percent, words
 
 LEAST_P = 1e-12  # a smaller p-value means no more
 ROUNDING = 1e-12  # of a mean: a smaller standard deviation is none
+OF_TIES = 1e-6  # a size and its interval no farther from no change: that of a test whose statistic jumps there
 GLOSSARY = Terms(
     (
         (
@@ -50,6 +51,11 @@ GLOSSARY = Terms(
             "shift",
             "The shift from run A to run B that the test does not distinguish from none: the Hodges–Lehmann "
             "estimate, in standard deviations σ of run A. Means of both runs are in columns of their own.",
+        ),
+        (
+            "ties",
+            "So many cases have equal values that the estimate of the size is no change, though the test finds one: "
+            "see the means, or the distributions.",
         ),
         ("spread", "The ratio, run B over run A, of the distances from each run’s own median, estimated likewise."),
         (
@@ -239,7 +245,8 @@ def _metric_table(comparison: Comparison, units: Mapping[str, str], moved: list[
     note = (
         "Significant changes first, each kind by its size. "
         f"Small: the {percent(comparison.confidence)} interval of the quantity that the test "
-        "is of; cases used of cases flown. σ: standard deviation of run A. *: significant, for better or worse."
+        "is of; cases used of cases flown. σ: standard deviation of run A. *: significant, for better or worse. "
+        "–: no size, as a run has no spread, or ties hide it."
     )
     rows = tuple(_metric_row(comparison, change, units[change.metric]) for change in moved)
     return Table("Metrics of both runs", columns, rows, note)
@@ -257,9 +264,9 @@ def _metric_row(comparison: Comparison, change: MetricChange, unit: str) -> tupl
     return (
         Cell(axis_label(words(change.metric, own), unit), small=used),
         *(_number_cell(value, scale) for value, scale in zip(means, scales, strict=True)),
-        _estimate_cell(change.shift_in_sigma),
+        _size_cell(change.shift_in_sigma, 0.0, change.shift_adjusted <= comparison.alpha),
         _p_value_cell(change.shift_adjusted, comparison.alpha),
-        _estimate_cell(change.ratio),
+        _size_cell(change.ratio, 1.0, change.spread_adjusted <= comparison.alpha),
         _p_value_cell(change.spread_adjusted, comparison.alpha),
     )
 
@@ -267,6 +274,14 @@ def _metric_row(comparison: Comparison, change: MetricChange, unit: str) -> tupl
 def _number_cell(value: float, scale: float) -> Cell:
     spread = scale if scale > ROUNDING * abs(value) else None
     return Cell(number(value, scale=spread), value) if np.isfinite(value) else Cell("–")
+
+
+def _size_cell(estimate: Estimate, none: float, significant: bool) -> Cell:
+    """The size of a change; of one that is significant, but whose interval is no change alone, that ties hide it."""
+    ends = np.array(astuple(estimate))
+    if significant and finite(estimate) and (np.abs(ends - none) <= OF_TIES).all():
+        return Cell("–", small="ties")
+    return _estimate_cell(estimate)
 
 
 def _estimate_cell(estimate: Estimate) -> Cell:
@@ -281,8 +296,8 @@ def _estimate_cell(estimate: Estimate) -> Cell:
 def _p_value_cell(value: float, alpha: float) -> Cell:
     if not np.isfinite(value):
         return Cell("no test")
-    text = number(value, 2) if value >= LEAST_P else f"< {number(LEAST_P, 2)}"
-    return Cell(f"{text} *" if value <= alpha else text, value)
+    text = number(value, 2) if value >= LEAST_P else f"<{SPACE}{number(LEAST_P, 2)}"
+    return Cell(f"{text}{SPACE}*" if value <= alpha else text, value)
 
 
 # ---- shares and requirements

@@ -9,6 +9,7 @@ from mc_engine.statistics.geodesy import ELLIPSOIDS, WGS84, middle_plane
 from reports.document.blocks import FigureBlock
 from reports.drawing.marks import Axis, Band, Drawing, Line, Plot, Points, between, to_scale
 from reports.drawing.palette import BLUE, VERMILION
+from reports.figures.histories import Envelope
 from reports.footprint.landings import landed, planet_of
 from reports.run.flown import Flown
 from reports.run.history_bands import fair_cases, history_envelopes
@@ -34,7 +35,9 @@ def overlay_blocks(runs: tuple[Flown, Flown], metrics: Sequence[str]) -> Iterato
     drawn = dict(_histories(runs))
     panels = tuple(item for item in drawn.values() if item is not None)[:MOST_PANELS]
     if panels:
-        caption = "Time histories of both runs: of the saved cases, or the nominal case where fewer than 20 are saved."
+        caption = (
+            "Time histories of both runs: of the saved cases, or the nominal ones where a run saved fewer than 20."
+        )
         yield FigureBlock(caption, Drawing(FORM, panels, 3), "half")
     if noise := [name for name, panel in drawn.items() if panel is None]:
         yield f"Not drawn, rounding errors only in both nominal cases: {', '.join(noise)}."
@@ -68,7 +71,10 @@ def _histories(runs: tuple[Flown, Flown]) -> Iterator[tuple[str, Plot | None]]:
     wanted = [name for figure in runs[1].figures if isinstance(figure, HistoryFigure) for name in figure.quantities]
     for name in dict.fromkeys(wanted):
         if all(len(run.histories) and name in run.histories.columns for run in runs):
-            marks = [mark for run, flown in enumerate(runs) for mark in _history_marks(run, flown, name)]
+            bands = [_band(flown, name) for flown in runs]
+            if None in bands:  # a band beside a nominal case alone would say that this run has no spread
+                bands = [None, None]
+            marks = [mark for run in (0, 1) for mark in _history_marks(run, runs[run], name, bands[run])]
             if marks:
                 plot = Plot(
                     tuple(marks), Axis(axis_label("time", runs[1].unit("t_s"))), Axis(runs[1].axis(name)), height=HEIGHT
@@ -78,10 +84,14 @@ def _histories(runs: tuple[Flown, Flown]) -> Iterator[tuple[str, Plot | None]]:
                 yield name, None if high - low < NOISE * np.ptp(saved[np.isfinite(saved)]) else plot
 
 
-def _history_marks(run: int, flown: Flown, name: str) -> Iterator[Band | Line]:
-    """The band and the median of the first cases; the nominal case where too few are saved."""
+def _band(flown: Flown, name: str) -> Envelope | None:
+    """The envelope of the first cases; None where too few are saved."""
     fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
-    band = history_envelopes(flown.histories, fair, [name]).get(name)
+    return history_envelopes(flown.histories, fair, [name]).get(name)
+
+
+def _history_marks(run: int, flown: Flown, name: str, band: Envelope | None) -> Iterator[Band | Line]:
+    """The band and its median, or the nominal case without one."""
     if band is not None:
         key = f"{NAMES[run]}: smallest to largest"
         yield between(band.at, band.curves[0.0], band.curves[1.0], COLOURS[run], 0.2, key=key)

@@ -115,7 +115,7 @@ def _constraint_cards(tuned: Tuned) -> Iterator[Card]:
         near = (numbers.max() if side == "largest" else numbers.min()) if numbers.size else np.nan
         yield Card(
             label=constraint["name"],
-            answer="within reach" if met else "out of reach",
+            answer="reached" if met else "not reached",
             detail=f"{metric_words(tuned, constraint)} {limit_words(tuned, constraint)}: "
             f"{count(met)} of {count(len(values))} candidates; "
             f"the {side} found is {tuned.with_unit(constraint['name'], float(near))}.",
@@ -129,11 +129,13 @@ def _objective_cards(tuned: Tuned) -> Iterator[Card]:
         if not values.size:
             yield Card(objective["name"], "no number", "no candidate has one", "open")
             continue
+        if not tuned.record.feasible:  # what no allowed candidate reaches is no result
+            continue
         ends = [tuned.with_unit(objective["name"], float(end)) for end in (values.min(), values.max())]
         best, other = ends if objective["goal"] == "minimise" else ends[::-1]
         yield Card(
             label=f"{objective['name']}, to be {'small' if objective['goal'] == 'minimise' else 'large'}",
-            answer=best if tuned.record.feasible else f"{best} without constraints",
+            answer=best,
             detail=f"{metric_words(tuned, objective)}{quantile_words(objective)}; "
             f"up to {other} at the other end of the front.",
         )

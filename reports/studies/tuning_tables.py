@@ -107,7 +107,7 @@ def parameter_table(tuned: Tuned) -> Table:
         Column("Parameter", "name"),
         Column("From", "number"),
         Column("To", "number"),
-        Column("On the front", "number"),
+        Column("On the front" if tuned.record.feasible else "Best without constraints", "number"),
         Column("Untuned", "number"),
         Column("Source of the range", "text"),
     )

@@ -151,6 +151,7 @@ def test_a_shard_is_no_run_to_extend_or_to_take_inputs_from(campaign, tmp_path):
         (("fork",), '"fork" is not known; there are threading, loky, dask'),
         (("loky", "tcp://node:1"), 'a scheduler is for the backend "dask"'),
         (("threading", None, 3.0), "a thread cannot be limited in time or memory"),
+        (("cuda", None, 3.0), "a card cannot be limited in time or memory"),
         (("dask", "tcp://node:1", None, 1000), "dask worker --memory-limit"),
         (("loky", None, None, None, 60.0), 'patience is for the backend "dask", whose workers come and go'),
     ],

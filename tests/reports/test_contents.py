@@ -195,6 +195,10 @@ def test_cases_of_a_grid_are_not_sold_as_probabilities():
     assert "do not estimate probabilities" in " ".join(document.warnings)
     assert "in the cases flown" in document.costs[0].answer
     assert not any("[" in cell.small for row in tables(document)["Percentiles of the metrics"].rows for cell in row)
+    assert tables(document)["Statistics of the metrics"].columns[-1].title == "Largest"  # their shape was chosen
+    keys = [mark.key for block in blocks_of(document, FigureBlock) for mark in block.drawing.key]
+    assert "median" in keys
+    assert not any("percentile" in key for key in keys)
 
 
 @pytest.mark.parametrize("n", [0, 1, 2])

@@ -84,3 +84,10 @@ def test_what_only_a_kept_run_can_have_is_refused(tmp_path):
     done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
     assert (done.returncode, "--until: is not for --watch, which keeps no run" in done.stderr) == (2, True)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_backend_that_is_not_there_is_told_before_watching_begins(tmp_path):
+    command = [sys.executable, "-m", "mc_engine", "run", "minimal", "--watch", "--backend", "fork"]
+    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=PATIENCE_S)
+    assert (done.returncode, '"fork" is not known' in done.stderr) == (2, True)
+    assert list(tmp_path.iterdir()) == []

@@ -72,6 +72,7 @@ def test_a_unit_that_is_not_told_is_asked_for():
 MISTAKES = {
     "argument": (("def rhs(s)", "def rhs(s, w)"), '`rhs` in line 26 takes "w"; a function takes what it names of t'),
     "misspelt argument": (("def rhs(s)", "def rhs(s, stat)"), 'takes "stat"; did you mean "state"?'),
+    "argument twice": (("def rhs(s)", "def rhs(s, state)"), '`rhs` takes "s" and "state", which are the same'),
     "argument of another": (("def observe(s)", "def observe(s, hit)"),
                             '`observe` in line 38 takes "hit"; a function takes'),
     "metric of nobody": (('top_speed_m_s=maximum_of("speed_m_s", ', "range_km=("),

@@ -68,7 +68,7 @@ def test_a_few_far_cases_do_not_squeeze_the_rest_and_are_counted():
     assert 3.0 < bins(found)[0][-1] < 8.0
     assert bins(found)[1].sum() == 10_000 - 3
     assert np.count_nonzero(bins(found)[1]) > 20
-    assert told(found) == "3 beyond the axis"
+    assert told(found) == "3 cases beyond the axis"
 
 
 def test_without_far_cases_all_are_shown_and_nothing_is_said():

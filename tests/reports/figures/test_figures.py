@@ -144,6 +144,15 @@ def test_a_narrow_panel_has_at_least_two_ticks_on_its_axis(ends, log):
         assert len(re.findall(r'text-anchor="middle">[−\d.·\u202f⁰¹²³⁴⁵⁶⁷⁸⁹]+</text>', svg)) >= 2 * panels
 
 
+def test_tick_labels_too_wide_for_a_narrow_panel_stand_upright_and_apart():
+    plot = Plot((), Axis("x", reach=(-2.000017, -1.999983)), Axis("y", ticks=((0.0, "99.865\u202f%"),)))
+    svg = paper.svg(Drawing("f", (plot,) * 4, 4))
+    assert not re.findall(r'text-anchor="middle">−[12]\.\d{5}<', svg)
+    places = [float(x) for x in re.findall(r'translate\(([\d.]+) [\d.]+\) rotate\(-90\)" [^>]*>−[12]\.\d{5}<', svg)]
+    assert len(places) >= 2 * 4
+    assert np.diff(places).min() > 7.0
+
+
 def test_a_limit_among_numbers_that_differ_by_little_is_drawn_where_it_is():
     plot = Plot((Limit(54.0527303, "x", INK, "limit"),), Axis(), Axis())
     assert screen.specifications(Drawing("f", (plot,)))[0]["data"][0]["x"] == [54.0527303] * 9

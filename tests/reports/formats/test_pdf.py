@@ -15,7 +15,7 @@ from payloads import PAYLOADS, hostile
 from synthetic_run import synthetic_run
 
 from reports import build, render_pdf
-from reports.document.blocks import Cell, Column, Section, Table
+from reports.document.blocks import Cell, Column, FigureBlock, Section, Table, blocks_of
 from reports.document.columns import spans
 
 MARKUP = [
@@ -173,3 +173,14 @@ def test_a_grouped_cell_is_shown_once_and_stands_for_all_its_rows():
     assert spans(Table("Contributors", columns, rows)) == [2, 0, 1]
     assert spans(Table("Contributors", columns[1:] * 2, rows)) == [1, 1, 1]
     assert spans(Table("Contributors", columns, ())) == []
+
+
+def test_a_figure_that_continues_on_the_next_page_has_its_key_there_too(tmp_path):
+    document = build(synthetic_run(200, failed=0), "run")
+    figure = next(one for one in blocks_of(document, FigureBlock) if one.drawing.key and len(one.drawing.plots) > 1)
+    many = replace(figure, drawing=replace(figure.drawing, plots=figure.drawing.plots[:2] * 12, across=2))
+    own = replace(document, sections=(Section("own", "Own", (many,)),))
+    pages = [page for page in text_of(render_pdf(own), tmp_path).split("\f") if many.drawing.plots[0].x.label in page]
+    assert len(pages) > 1
+    assert many.drawing.key[-1].key == "required limit"
+    assert [page.count("required limit") for page in pages] == [1] * len(pages)

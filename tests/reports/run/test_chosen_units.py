@@ -14,7 +14,7 @@ from reports.document.blocks import FigureBlock, blocks_of
 from reports.formats.html import case_record, render_html
 from reports.formats.json_data import render_json
 from reports.formats.markdown import render_markdown
-from reports.run.chosen_units import ShownRun, chosen_unit
+from reports.run.chosen_units import ShownRun, chosen_unit, spread_text
 from reports.run.flown import Flown
 
 
@@ -62,6 +62,19 @@ def test_a_metric_has_one_unit_on_all_pages_and_on_the_axes(slow):
     axes = [plot.x.label for one in blocks_of(document, FigureBlock) for plot in one.drawing.plots]
     assert "settling time [days]" in axes
     assert "time [days]" in axes
+
+
+def test_a_spread_is_told_in_the_unit_of_its_metric_or_in_its_own():
+    run = synthetic_run(200, failed=0)
+    column = next(one for one in run.manifest["columns"] if one["name"] == "settling_time_s")
+    run.table["settling_time_s"] = 800_000.0 + run.table["ve_pct"]
+    run.nominal_row["settling_time_s"] = 800_000.0
+    long = ShownRun(Flown(run, "run"))
+    assert (long.unit("settling_time_s"), spread_text(long, "settling_time_s", 0.0)[-1]) == ("day", "s")
+    column["unit"] = "deg"
+    run.table["settling_time_s"] = 2.0 + 1e-7 * run.table["ve_pct"]
+    run.nominal_row["settling_time_s"] = 2.0
+    assert spread_text(ShownRun(Flown(run, "run")), "settling_time_s", 1e-6).endswith("\u202fdeg")
 
 
 def test_verdicts_and_counts_are_those_of_the_columns_own_units(slow):

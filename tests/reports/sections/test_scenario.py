@@ -101,3 +101,13 @@ def test_the_worst_cases_of_requirements_not_met_come_first():
     assert [one.caption.removeprefix("Cases with the largest ") for one in blocks[:3]] == [
         "peak force", "settling time", "propellant",
     ]  # fmt: skip
+
+
+def test_what_is_at_the_start_of_the_nominal_case_is_no_event_of_its_timeline():
+    run = synthetic_run(50, failed=0)
+    run.manifest["columns"] += [{"name": "peak_load_time_s", "unit": "s", "role": "metric", "description": "when"}]
+    run.table = run.table.assign(peak_load_time_s=100.0 + run.table["case_id"])
+    run.nominal_row |= {"peak_load_time_s": 100.0, "settling_time_s": 0.0}
+    table = next(one for one in section(run, "scenario").blocks if isinstance(one, Table))
+    assert [row[0].text for row in table.rows] == ["Peak load"]
+    assert table.note.endswith("not listed: settling.")

@@ -5,6 +5,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from synthetic_run import synthetic_run
 
@@ -37,7 +38,7 @@ def test_the_headline_says_what_changed_and_the_table_by_how_much():
     assert document.subtitle.endswith("chance of any false alarm).")
     assert [(card.label, card.tone) for card in document.verdicts][:2] == [("Requirements", ""), ("Shift", "")]
     (row,) = [row for row in tables(document)["Metrics of both runs"].rows if row[0].text.startswith("peak force")]
-    assert (row[4].text[-2:], row[4].tone) == (" *", "")  # a change alone is neither good nor bad
+    assert (row[4].text[-2:], row[4].tone) == ("\u202f*", "")  # a change alone is neither good nor bad
     change = next(one for one in found.metrics if one.metric == "peak_force_n")
     assert row[3].value == pytest.approx(change.shift.value / change.deviation[0])
     (figure,) = blocks_of(document, FigureBlock)
@@ -126,6 +127,18 @@ def test_both_runs_are_laid_over_one_another_with_the_counts_of_the_table():
     assert "run B: fraction of the cases" in page
 
 
+def test_a_run_with_few_histories_is_not_drawn_as_one_without_spread_beside_the_other():
+    a, b = two_runs(1.0)
+    one = a.history[a.history["case_id"] == 0]
+    nominal = a.history[a.history["case_id"] == -1]
+    a.history = pd.concat([nominal, *(one.assign(case_id=case) for case in range(30))])
+    b.history = b.history[b.history["case_id"] < 3].copy()  # too few for envelopes
+    document = build_comparison(compare_runs(a, b, ("before", "after")), (a, b))
+    section = next(one for one in document.sections if one.anchor == "overlays")
+    keys = {mark.key for panel in section.blocks[1].drawing.plots for mark in panel.marks}
+    assert keys == {"run A: nominal", "run B: nominal"}
+
+
 def test_rounding_errors_of_nominal_cases_are_not_drawn_over_one_another():
     a, b = two_runs(1.0)
     for seed, run in enumerate((a, b)):
@@ -212,3 +225,19 @@ def test_the_ticks_of_a_ratio_lie_inside_and_hold_one(span):
     assert 2 <= len(ticks) <= 9
     assert np.all(np.diff(ticks) > 0.0)
     assert span[0] <= ticks[0] <= ticks[-1] <= span[1]
+
+
+def test_a_significant_change_that_ties_hide_has_no_size_of_no_change():
+    runs = []
+    for pulses in (0.1, 0.3):  # of most cases there is none in both runs
+        made = synthetic_run(1000, failed=0, seed=len(runs) + 1)
+        draws = np.random.Generator(np.random.Philox(key=7)).random(1000)
+        made.table["settling_time_s"] = np.where(draws < pulses, 1.0, 0.0)
+        runs.append(SimpleNamespace(manifest=made.manifest, campaign_text="", cases=made.cases))
+    found = compare_runs(*runs, ("before", "after"))
+    change = next(one for one in found.metrics if one.metric == "settling_time_s")
+    assert change.shift_adjusted <= found.alpha
+    assert abs(change.shift.upper) < 1e-6
+    rows = tables(build_comparison(found))["Metrics of both runs"].rows
+    (row,) = [row for row in rows if row[0].text.startswith("settling time")]
+    assert (row[3].text, row[3].small, row[4].text[-2:]) == ("–", "ties", "\u202f*")

@@ -79,8 +79,9 @@ def test_infeasibility_is_stated_with_the_least_violation_and_never_hidden(infea
     assert infeasible.subtitle.startswith("No feasible point among 300 candidates; the least violation found is")
     assert "where at most −1 is allowed" in infeasible.subtitle
     assert infeasible.warnings[0].startswith("There is no front")
-    assert infeasible.verdicts[0].answer == "out of reach"
+    assert infeasible.verdicts[0].answer == "not reached"  # by a search that ended, not by any design
     assert infeasible.verdicts[0].tone == "bad"
+    assert not infeasible.costs  # what a forbidden candidate reaches is no key result
     drawing = front_of(infeasible)
     assert not any("feasible candidates" in mark.key for mark in drawing.key)
     assert any("constraints are left out" in mark.key for mark in drawing.key)
@@ -90,7 +91,7 @@ def test_infeasibility_is_stated_with_the_least_violation_and_never_hidden(infea
 
 def test_a_feasible_search_has_no_such_warning(document):
     assert document.warnings == ()
-    assert document.verdicts[0].answer == "within reach"
+    assert document.verdicts[0].answer == "reached"
     assert "beaten by no other" in document.subtitle
 
 
