@@ -326,7 +326,7 @@ def bench(
     Nothing is stored.
     """
     from mc_engine.campaign.loading import load_campaign
-    from mc_engine.flight.kernel import usual_width
+    from mc_engine.flight.kernel import registers, usual_width
     from mc_engine.model.faults import naming_faults
     from mc_engine.studies.lane_speed import campaign_flight, measure
 
@@ -341,7 +341,7 @@ def bench(
         return
     with naming_faults(campaign.model_reference, "the model"):
         flight = campaign_flight(campaign, cases)
-        timing = measure(flight, sorted({1, 8, usual_width(flight.model)}), repeats)
+        timing = measure(flight, (1, registers().doubles, 2 * registers().doubles), repeats)
     typer.echo(f"{campaign.name}: {flight.n_cases} cases a flight, the fastest of {repeats}, one thread")
     for line in _timing_lines(timing, usual_width(flight.model)):
         typer.echo(line)

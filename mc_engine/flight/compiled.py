@@ -16,7 +16,7 @@ from mc_engine.store.case_rows import RowLog
 
 
 class CompiledFlyer(Flyer):
-    """A compiled model: eight or sixteen cases at a time, each independent of the others.
+    """A compiled model: four, eight or sixteen cases at a time, each independent of the others.
 
     It needs neither `log` nor `keep`: a chunk takes seconds at most, and leaves no files.
     """

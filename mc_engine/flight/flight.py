@@ -44,7 +44,7 @@ def fly(
     """Results of some cases as columns: status, reason, `end_...` states and metrics in declared units.
 
     case_ids : int64[n], the addresses of the noise.  Cases of different settings may be mixed.
-    width : cases at a time, 1, 8 or 16; by default what is fastest for the model.
+    width : cases at a time, 1, 4, 8 or 16; by default what is fastest for the model.
     clock : another one of the kind of the model's own; the kernel is the same.  build : see `Builder`.
     """
     width = width or usual_width(model)

@@ -8,12 +8,13 @@ wherever they lie.
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from llvmlite import binding
 
 from mc_engine.cache_folder import cache_folder
 from mc_engine.errors import DiskError, ModelError
@@ -26,9 +27,7 @@ from mc_engine.model.imports import new_module
 from mc_engine.model.record import Model, sources_of
 
 Builder = Callable[[Model, Path | None, int], Callable[..., Any]]  # gives, as `build_kernel`, what is called
-WIDTH = 8  # one register of eight doubles
 _MOST_STEPS = 10**9  # of a flight, as AdaptiveStep's attempts: a year of 0.03 s, a minute of one core
-_FEW_FIXED, _FEW_ADAPTIVE = 18, 12  # values
 _ENGINE = (
     "flight/kernel.py",
     "flight/kernel_key.py",
@@ -119,22 +118,44 @@ def source_digest(model: Model, folder: Path | None) -> str:
     return digest.hexdigest()
 
 
-def usual_width(model: Model) -> int:
-    """How many cases of a model fly at a time: 8, or 16 where two registers a number hide the waiting of one another.
+class Registers(NamedTuple):
+    """Vector registers of a processor.
 
-    Measured (tests/benchmarks): with few values to hold sixteen are a tenth to a third faster, with many they are
-    not.  Adaptive steps hold the events and extrema too.  The results have the same bits.
+    doubles : numbers that one holds.
+    few_fixed, few_adaptive : values of a case that kernels on a fixed grid, and adaptive ones, can hold in two each.
     """
+
+    doubles: int
+    few_fixed: int
+    few_adaptive: int
+
+
+@cache
+def registers() -> Registers:
+    """The vector registers of this processor: 32 of AVX-512, else counted as 16 of AVX2, as NEON's 32 of half the size.
+
+    Measured (`python -m tests.benchmarks.lanes`, `mc-engine bench`) on Zen 5 and Zen 3.
+    """
+    return Registers(8, 18, 12) if binding.get_host_cpu_features().get("avx512f") else Registers(4, 8, 12)
+
+
+def usual_width(model: Model) -> int:
+    """How many cases of a model fly at a time: a register of them, or two, which hide the waiting of one another.
+
+    With few values to hold, two registers a number are up to a third faster; with many they are not, and of 16 they
+    take up to 1.5 times as long.  Adaptive steps hold the events and extrema too.  The results have the same bits.
+    """
+    doubles, few_fixed, few_adaptive = registers()
     if isinstance(model.clock, AdaptiveStep):
-        few = len(model.states) + len(model.event_list) + len(model.extrema) <= _FEW_ADAPTIVE
+        few = len(model.states) + len(model.event_list) + len(model.extrema) <= few_adaptive
     else:
-        few = len(model.states) <= _FEW_FIXED
-    return 2 * WIDTH if few else WIDTH
+        few = len(model.states) <= few_fixed
+    return 2 * doubles if few else doubles
 
 
 @lru_cache(maxsize=64)
-def build_kernel(model: Model, folder: Path | None = None, width: int = WIDTH) -> Kernel:
-    """The kernel of `model` for `width` cases at a time: 1 (plain float64), 8 or 16.
+def build_kernel(model: Model, folder: Path | None, width: int) -> Kernel:
+    """The kernel of `model` for `width` cases at a time: 1 (plain float64), 4, 8 or 16.
 
     folder : see `sources_of`.  The kernel's first call compiles it or loads it from the cache.
     """

@@ -62,7 +62,7 @@ class Timing:
     ns: dict[int, float] = field(default_factory=dict)
     ready_s: dict[int, float] = field(default_factory=dict)
 
-    def ratio(self, width: int = 8) -> float:
+    def ratio(self, width: int) -> float:
         """How many times longer a case takes one at a time."""
         return self.case_s[1] / self.case_s[width]
 

@@ -14,12 +14,13 @@ import numpy as np
 
 import mc_engine
 from mc_engine.campaign.loading import load_campaign
+from mc_engine.flight.kernel import registers
 from mc_engine.model import load_model
 from mc_engine.studies.lane_speed import Flight, campaign_flight, measure
 
 HERE = Path(__file__).resolve().parent
 ROCKET = Path(mc_engine.__file__).parent / "documentation" / "tutorial" / "sounding_rocket"
-WIDTHS = (1, 8, 16)
+WIDTHS = (1, registers().doubles, 2 * registers().doubles)
 LONG = 12  # repeats of the long flights
 
 

@@ -21,6 +21,7 @@ if str(ROOT) not in sys.path:
 import pyarrow as pa  # noqa: E402
 import pyarrow.parquet as pq  # noqa: E402
 
+from mc_engine.flight.kernel import registers  # noqa: E402
 from tests.benchmarks.lanes import processor  # noqa: E402
 from tests.benchmarks.peer_codes import engine, handwritten, problems, scipy_peer  # noqa: E402
 from tests.benchmarks.peer_codes.contest import Contest, Result, hold  # noqa: E402
@@ -46,8 +47,9 @@ def _absent(*names: str) -> tuple[str, ...]:
 
 
 def _fixed_step(problem: Problem, step: float) -> Contest:
-    """RK4 with one step: the engine sixteen, eight and one at a time, and the lanes written by hand."""
-    entrants = [engine.entrant(problem, "RK4", width, (step,)) for width in (16, 8, 1)]
+    """RK4 with one step: the engine in two registers, one, and one case at a time, and the lanes written by hand."""
+    widths = 2 * registers().doubles, registers().doubles, 1
+    entrants = [engine.entrant(problem, "RK4", width, (step,)) for width in widths]
     entrants += handwritten.entrants(problem, step)
     if problem.rate is None:
         entrants.append(scipy_peer.entrant(problem))

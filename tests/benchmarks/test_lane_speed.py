@@ -1,11 +1,13 @@
-"""Eight lanes against one in the same run.  A ratio, so that it holds on a slow machine and on a busy one."""
+"""Lanes of a register against one lane in the same run.  A ratio, so that it holds on slow machines and busy ones."""
 
 import pytest
 from lanes import LONG, deorbit, flexible, flexible_pulses, orbit, sounding_rocket
 from llvmlite import binding
 
+from mc_engine.flight.kernel import registers, usual_width
 from mc_engine.studies.lane_speed import measure
 
+SLOWER = 1.15  # by chance
 ATTEMPTS = 12  # a neighbour on the machine can spoil several measurements
 # of what the registers allow: where thrusters switch, the lanes that do not switch wait for those that do, and a
 # measured 7.0 to 7.1 leaves nothing for a busy machine
@@ -20,7 +22,7 @@ def least_ratio():
         # lanes, which fill the core, than from one.
         return 3.5 if binding.get_host_cpu_name() == "znver4" else 7.0
     if features.get("avx2"):
-        return 3.0
+        return 3.0  # Zen 3, quiet: 3.7 to 4.2
     return None
 
 
@@ -28,7 +30,7 @@ def best_ratio(cases, wanted, repeats):
     """The best of some attempts, ended by the first that is good enough."""
     best = 0.0
     for _ in range(ATTEMPTS):
-        best = max(best, measure(cases(), (1, 8), repeats).ratio())
+        best = max(best, measure(cases(), (1, registers().doubles), repeats).ratio(registers().doubles))
         if best >= wanted:
             break
     return best
@@ -37,7 +39,7 @@ def best_ratio(cases, wanted, repeats):
 @pytest.mark.benchmark
 @pytest.mark.skipif(least_ratio() is None, reason="this processor has neither AVX-512 nor AVX2")
 @pytest.mark.parametrize(("cases", "repeats"), [(orbit, 60), (deorbit, 60), (flexible, LONG), (sounding_rocket, LONG)])
-def test_eight_lanes_fly_as_many_times_as_fast_as_one_as_the_processor_allows(cases, repeats):
+def test_the_lanes_of_a_register_fly_as_many_times_as_fast_as_one_as_the_processor_allows(cases, repeats):
     assert best_ratio(cases, least_ratio(), repeats) >= least_ratio()
 
 
@@ -46,3 +48,12 @@ def test_eight_lanes_fly_as_many_times_as_fast_as_one_as_the_processor_allows(ca
 def test_and_nearly_so_where_thrusters_switch_at_other_times_in_every_lane():
     least = WITH_PULSES * least_ratio()
     assert best_ratio(flexible_pulses, least, LONG) >= least
+
+
+@pytest.mark.benchmark
+@pytest.mark.parametrize(("cases", "repeats"), [(orbit, 60), (deorbit, 60), (flexible, LONG), (sounding_rocket, LONG)])
+def test_as_many_cases_fly_at_a_time_as_are_fastest(cases, repeats):
+    flight = cases()
+    usual, widths = usual_width(flight.model), (registers().doubles, 2 * registers().doubles)
+    timings = (measure(flight, widths, repeats) for _ in range(ATTEMPTS))
+    assert any(timing.case_s[usual] <= SLOWER * min(timing.case_s.values()) for timing in timings)

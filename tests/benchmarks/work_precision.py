@@ -3,7 +3,8 @@
     python tests/benchmarks/work_precision.py
 
 Prints the tables of the README.  The error is the largest distance of the end positions of 16 dispersed cases from a
-reference flight in 80-bit numbers; the time is that of a case, eight at a time in one thread, shortest of some turns.
+reference flight in 80-bit numbers; the time is that of a case, in one thread, as many at a time as in a run,
+shortest of some turns.
 """
 
 import sys

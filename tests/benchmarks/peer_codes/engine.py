@@ -1,4 +1,4 @@
-"""The engine itself: its compiled kernels, called as a run calls them, eight cases at a time or one."""
+"""The engine itself: its compiled kernels, called as a run calls them, many cases at a time or one."""
 
 from dataclasses import replace
 

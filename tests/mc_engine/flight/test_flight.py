@@ -48,7 +48,7 @@ def chosen(inputs, cases):
     return {name: value[cases] if np.ndim(value) else value for name, value in inputs.items()}
 
 
-def flown(model, inputs, cases, *, width=16, chunk=N_CASES, threads=1):
+def flown(model, inputs, cases, *, width=None, chunk=N_CASES, threads=1):
     """Columns of the cases, flown in chunks by threads, put together in the order of `cases`."""
     parts = [cases[first : first + chunk] for first in range(0, len(cases), chunk)]
     with ThreadPoolExecutor(threads) as pool:
@@ -68,7 +68,7 @@ def different(one, other):
 
 @pytest.fixture(scope="module")
 def whole(model, inputs):
-    """All cases in order, sixteen at a time, in one chunk."""
+    """All cases in order, as many at a time as in a run, in one chunk."""
     columns = flown(model, inputs, np.arange(N_CASES))
     assert set(columns["status"]) == {"ok"}
     assert columns["pulse_count"].max() > 1
@@ -76,7 +76,7 @@ def whole(model, inputs):
 
 
 # The builds of other widths than a run's own take long to compile.
-@pytest.mark.parametrize("width", [16, *(pytest.param(width, marks=pytest.mark.deep) for width in (1, 8))])
+@pytest.mark.parametrize("width", [None, *(pytest.param(width, marks=pytest.mark.deep) for width in (1, 4, 8, 16))])
 @pytest.mark.parametrize(
     ("chunk", "n_cases", "threads", "shuffled"),
     [(1, 64, 2, False), (7, 203, 1, True), (64, 1000, 2, True), (1000, 1000, 1, True)],

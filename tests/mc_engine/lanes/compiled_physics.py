@@ -5,10 +5,11 @@ from functools import cache
 import numpy as np
 from numba import njit
 
+from mc_engine.flight.kernel import registers
 from mc_engine.lanes.compiler import STRICT
 from mc_engine.lanes.tuples import load, store_fields
 
-WIDTHS = (1, 8, 16)
+WIDTHS = (1, registers().doubles, 2 * registers().doubles)  # that are flown on this processor
 
 
 @cache
