@@ -84,6 +84,7 @@ DEEP = (
     "mc_engine/lanes/test_records.py::test_a_discrete",
     "mc_engine/lanes/test_tables.py::test_a_place_outside",
     "mc_engine/lanes/test_tables.py::test_every_lane",
+    "mc_engine/model/test_compiled_loops.py::test_a_loop_is_compiled_once",
     "mc_engine/model/test_declarations.py::test_a_discrete_state",
     "mc_engine/model/test_declarations.py::test_arguments",
     "mc_engine/model/test_declarations.py::test_events_may_share",

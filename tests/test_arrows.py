@@ -1,6 +1,7 @@
 """Imports point one way: campaigns -> mc_engine <- reports."""
 
 import ast
+from fnmatch import fnmatch
 from functools import cache
 from pathlib import Path
 
@@ -37,21 +38,37 @@ def test_no_import_points_against_the_arrows(package, forbidden):
     assert [one for one in imported(package) if one[1].split(".")[0] in forbidden] == []
 
 
-def test_reports_know_of_the_engine_only_what_a_store_and_its_statistics_are():
-    known = {
+# What a package may take from the engine, besides the public names of its packages: modules by room, "" is the root.
+KNOWN = {
+    "reports": {
         "": "units status errors durable_file shell_words text",
         "model": "figures",
         "runner": "summary",
         "statistics": "*",
         "store": "*",
         "studies": "comparison published rare_event_folder replay_files run_changes tuning_folder",
-    }
-    used = {tuple(name.split(".")[1:3]) for _, name in imported("reports") if name.startswith("mc_engine.")}
-    for room, *module in used:
-        if not module and room not in known:
-            room, module = "", [room]
-        assert room in known, room
-        assert not module or known[room] == "*" or module[0] in known[room].split(), (room, module)
+    },
+    "campaigns": {  # as any user's model; `flight` and `published_values` fly the cases of published results
+        "": "errors",
+        "flight": "flight",
+        "lanes": "noise runge_kutta_pairs",
+        "model": "figures",
+        "physics": "*",
+        "statistics": "*",
+        "studies": "published published_values",
+    },
+}
+
+
+@pytest.mark.parametrize("package", KNOWN)
+def test_reports_and_campaigns_take_from_the_engine_only_what_is_listed(package):
+    engine, files = modules("mc_engine"), modules(package)
+    used = {name for path in files.values() for name in taken(path, engine)}
+    rooms = {f"mc_engine.{room}".rstrip("."): names.split() for room, names in KNOWN[package].items()}
+    listed = [*rooms, *(f"{room}.{name}" for room, names in rooms.items() for name in names)]
+    assert len(used) > 8
+    assert [name for name in sorted(used) if not any(fnmatch(name, one) for one in listed)] == []
+    assert [one for one in listed if "*" not in one and one.count(".") > 1 and one not in used] == []
 
 
 def test_the_public_names_are_these():

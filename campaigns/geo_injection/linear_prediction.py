@@ -13,8 +13,7 @@ import numpy as np
 import pandas as pd
 
 from campaigns.geo_injection.model import MODEL
-from mc_engine.campaign.cases import case_table
-from mc_engine.campaign.loading import load_campaign
+from mc_engine import case_table, load_campaign
 from mc_engine.flight.flight import fly
 
 SMOOTH = ["semi_major_axis_km", "radius_error_km", "longitude_drift_deg_day", "propellant_kg", "final_mass_kg"]

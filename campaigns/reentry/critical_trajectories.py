@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from campaigns.reentry.planets import PLANETS
-from mc_engine.campaign.loading import load_campaign
+from mc_engine import load_campaign
 from mc_engine.flight.flight import chosen_cases
 from mc_engine.model import load_model
 

@@ -1,7 +1,7 @@
 """The compiled kernel of a model: assembled from its physics and the engine's loop, cached on disk.
 
 Every kernel has a small source file of its own, in a folder named by the digest of what the kernel is compiled from
-(`mc_engine.flight.kernel_key`), and beside it its machine code.  Models that compile to the same code share a kernel,
+(`mc_engine.lanes.kernel_key`), and beside it its machine code.  Models that compile to the same code share a kernel,
 wherever they lie.
 """
 
@@ -18,9 +18,9 @@ from llvmlite import binding
 
 from mc_engine.cache_folder import cache_folder
 from mc_engine.errors import DiskError, ModelError
-from mc_engine.flight.kernel_key import Recorder, kernel_key
 from mc_engine.flight.kernel_parts import Functions, parts_of, second_order_of, tracking_of
 from mc_engine.lanes.kernel_cache import Form, Kernel, replace_file
+from mc_engine.lanes.kernel_key import Recorder, kernel_key
 from mc_engine.lanes.runge_kutta_pairs import PAIRS
 from mc_engine.model.fields import AdaptiveStep, FixedStep, uses_rates
 from mc_engine.model.imports import new_module
@@ -30,7 +30,6 @@ Builder = Callable[[Model, Path | None, int], Callable[..., Any]]  # gives, as `
 _MOST_STEPS = 10**9  # of a flight, as AdaptiveStep's attempts: a year of 0.03 s, a minute of one core
 _ENGINE = (
     "flight/kernel.py",
-    "flight/kernel_key.py",
     "flight/kernel_parts.py",
     "model/fields.py",
     "model/record.py",
@@ -186,20 +185,6 @@ def _handed(written: Model, model: Model, makers: Any = None) -> dict[str, Any]:
     """
     parts = {"PARTS": parts_of(replace(written, clock=model.clock), model.watching, makers)}
     return parts | ({"SECOND_ORDER": second_order_of(model, makers)} if uses_rates(model.clock) else {})
-
-
-def kernel_of(function: Callable[..., Any]) -> Kernel:
-    """A kernel of one function of numbers and arrays, kept as the kernels of models are.
-
-    function : gives nothing, or a whole number; what it calls is physics, or compiled by `compile_inline`.
-    """
-    from mc_engine.lanes.compiler import compile_kernel
-
-    made = compile_kernel(function)
-    digest, is_complete = kernel_key(made.dispatcher, "")
-    if not is_complete:
-        raise ModelError(f"{function.__qualname__} calls what is neither physics nor compiled by `compile_inline`")
-    return Kernel(cache_folder() / "kernels" / digest[:20] / function.__name__, made.library)
 
 
 def _template(model: Model) -> str:

@@ -9,8 +9,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from mc_engine.errors import ModelError
 from mc_engine.lanes import kernel_data_lowering as _kernel_data  # registers what reads the data of a kernel
 from mc_engine.lanes import lowering as _lowering  # registers the lane type and its functions
-from mc_engine.lanes import namespaces as _namespaces  # registers classes that hold constants
-from mc_engine.lanes import records as _records  # registers records of plain numbers and lanes
+from mc_engine.lanes import records as _records  # registers records, and classes that hold constants
 from mc_engine.lanes.kernel_cache import Form
 from mc_engine.lanes.linked import KernelCompiler, LinkedCompiler
 
@@ -32,7 +31,6 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
     raise ModelError("the environment has NUMBA_DISABLE_JIT, with which no kernel can be compiled; unset it")
 assert _kernel_data
 assert _lowering
-assert _namespaces
 assert _records
 
 
@@ -63,6 +61,9 @@ class KernelCompilation:
         self.dispatcher._compilation_chain_init_hook()
         with global_compiler_lock:
             compiled = self.dispatcher._compiler.compile(tuple(_type(word) for word in form), None)
+        if compiled.fndesc.restype != types.none:
+            name = self.dispatcher.py_func.__qualname__
+            raise ModelError(f"{name} returns something; its results have to be written into arrays that it is handed")
         return compiled.fndesc.llvm_func_name, compiled.library
 
 

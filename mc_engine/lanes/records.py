@@ -1,22 +1,30 @@
-"""Named tuples in kernels, as numba itself does not have them.  Registered on import.
+"""Named tuples, classes and namespaces in kernels, as numba itself does not have them.  Registered on import.
 
-One that holds plain numbers in one place and lanes in another is one type: physics may return `State(s.v, 0.0)` in one
-branch and `State(s.v, s.x)` in the other, or begin a loop with a record of plain numbers.
+A named tuple that holds plain numbers in one place and lanes in another is one type: physics may return
+`State(s.v, 0.0)` in one branch and `State(s.v, s.x)` in the other, or begin a loop with a record of plain numbers.
 
 A field that is left out has the default of its class, as in Python.  A field may be a record itself; `replace` and
 `where` are here for records.
+
+Compiled code reads the attributes of classes and of `SimpleNamespace` as constants, as it does those of modules.
 """
 
 import inspect
+from types import SimpleNamespace
 from typing import Any
 
 from numba import typeof, types
 from numba.core import utils
+from numba.core.registry import cpu_target
 from numba.core.typing.collections import NamedTupleClassAttribute
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.core.typing.typeof import typeof_impl
 from numba.extending import lower_builtin, lower_cast
 
 from mc_engine.lanes import functions
+
+_HEAP_TYPE = 1 << 9  # set of a class that is made by a statement, Py_TPFLAGS_HEAPTYPE
+_type_of_class = typeof_impl.dispatch(type)
 
 
 def _of_one_class(record: Any, other: Any) -> bool:
@@ -130,3 +138,29 @@ def _lower_where(context, builder, sig, args):
         cast = [context.cast(builder, *conversion) for conversion in zip(values, given, own.args, strict=True)]
         fields.append(context.get_function(function, own)(builder, cast))
     return context.make_tuple(builder, sig.return_type, fields)
+
+
+# ---- classes and namespaces
+
+
+class Namespace(types.Module):
+    """The numba type of one class or namespace: a module to numba, whose attributes are constants."""
+
+    @property
+    def key(self) -> int:
+        """By identity: namespaces have no hash."""
+        return id(self.pymod)
+
+
+@typeof_impl.register(type)
+def _of_class(value: Any, context: Any) -> Any:
+    """What numba knows a class as, and a namespace where it knows none."""
+    known = _type_of_class(value, context)
+    if known is not None or not value.__flags__ & _HEAP_TYPE:
+        return known
+    return Namespace(value) if cpu_target.typing_context._lookup_global(value) is None else None
+
+
+@typeof_impl.register(SimpleNamespace)
+def _of_namespace(value: Any, context: Any) -> Any:
+    return Namespace(value)

@@ -16,7 +16,7 @@ from mc_engine.model.declarations import (
     value_at,
 )
 from mc_engine.model.declared import model, prepared
-from mc_engine.model.designs import kept_design
+from mc_engine.model.designs import compiled_loop, kept_design
 from mc_engine.model.fields import AdaptiveStep, Event, Extremum, Field, FixedStep, Named, Parameter, Setting
 from mc_engine.model.figures import (
     CorridorFigure,
@@ -49,6 +49,7 @@ __all__ = [
     "Setting",
     "at_end",
     "choices",
+    "compiled_loop",
     "inputs",
     "kept_design",
     "last_above",

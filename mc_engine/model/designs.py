@@ -11,7 +11,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from functools import cache
+from functools import cache, wraps
 from hashlib import sha256
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,7 +21,8 @@ import numpy as np
 
 from mc_engine.cache_folder import cache_folder
 from mc_engine.durable_file import make_folder, read_file, write_durably
-from mc_engine.errors import StoreError
+from mc_engine.errors import ModelError, StoreError
+from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model.imports import USER
 from mc_engine.model.sources import sources_beside, sources_of_module
 
@@ -66,6 +67,56 @@ def kept_design(design: Callable[..., np.ndarray], *inputs: Any) -> np.ndarray:
         make_folder(path.parent)
         write_durably(path, sha256(content).digest() + content)
     return designed
+
+
+def compiled_loop(function: Callable[..., None]) -> Callable[..., None]:
+    """Decorator of a loop over numbers and arrays that would take too long in Python or NumPy: it runs as machine code.
+
+    function : takes float64 and int64 numbers and writable contiguous arrays of them, of one or two dimensions; writes
+        its results into arrays, which are all arguments, and returns nothing.  The functions that it calls are marked
+        with `mc_engine.lanes.physics` and may take arrays here
+
+    Returns the compiled function, whose arguments are given by position.  Its attribute `__wrapped__` is `function`.
+    Both give the same bits where the mathematics is that of `mc_engine.lanes`.
+
+    The first call compiles, in a second or more, or loads the machine code from the cache folder.  It is kept there
+    under a digest of the function and of all that it calls and names; global numbers and arrays are constants.  Indices
+    are not checked.
+
+    Raises ModelError at a call if the function returns something, or calls one that is not physics; TypeError for other
+    arguments.
+
+    >>> @compiled_loop
+    ... def add_up(x, total):
+    ...     for i in range(x.size):
+    ...         total[0] += x[i]
+    >>> total = np.zeros(1)
+    >>> add_up(np.array([1.0, 2.0, 3.5]), total)
+    >>> total
+    array([6.5])
+    """
+
+    @cache
+    def kernel() -> Callable[..., int]:
+        from mc_engine.lanes.kernel_cache import Kernel  # loads LLVM
+        from mc_engine.lanes.kernel_key import kernel_key
+
+        digest, is_complete = kernel_key(PhysicsFunction(function), "")
+        if not is_complete:
+            raise ModelError(f"{function.__qualname__} names what compiled code cannot follow; mark the functions that "
+                             "it calls with @physics of mc_engine.lanes")  # fmt: skip
+        return Kernel(cache_folder() / "kernels" / digest[:20] / function.__name__, compiled)
+
+    def compiled(form: tuple[str, ...]) -> tuple[str, Any]:
+        from mc_engine.lanes.compiler import compile_kernel  # imports numba
+
+        return compile_kernel(function).library(form)
+
+    @wraps(function)
+    def run(*arguments: Any) -> None:
+        kernel()(*arguments)
+
+    return run
 
 
 @contextmanager

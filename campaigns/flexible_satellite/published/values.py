@@ -13,9 +13,8 @@ import numpy as np
 import pandas as pd
 
 from campaigns.flexible_satellite.model import MODEL
-from mc_engine.campaign.loading import load_campaign
+from mc_engine import load_campaign, tune
 from mc_engine.flight.flight import chosen_case, chosen_history
-from mc_engine.studies.tuning import tune
 
 _FOLDER = Path(__file__).resolve().parents[1]
 MODULATOR = ("pwpf_gain", "pwpf_time_constant_s", "pwpf_u_off", "pwpf_hysteresis", "thrust_level")

@@ -17,6 +17,7 @@ import numpy as np
 import scipy  # loads its packages when they are used
 
 from campaigns.geo_injection.design.coast import coast
+from campaigns.geo_injection.design.powered_arc import fly_burns
 
 SOLVED = 1e-11  # largest residual of a solution
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(48)
@@ -86,8 +87,6 @@ def switch_states(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
 
     Coasts by eqs (19)-(21) of the source, burns by (1) and (16).
     """
-    from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
-
     mass, states = np.ones(len(unknowns)), [first_states(problem, unknowns)]
     for k, duration in enumerate(unknowns[:, 7 : 7 + problem.burns].T):
         if k > 0:
@@ -232,8 +231,6 @@ def arcs(solution: Solution, n: int = 200) -> list[Arc]:
     the switching function, is zero at the last cut-off.  The mass costate l is 0 at the end, so the arcs are found from
     the last to the first; its rate is integrated by Gauss's rule.
     """
-    from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
-
     problem, states = solution.problem, solution.states
     masses = 1.0 - problem.flow * np.concatenate([[0.0], np.cumsum(solution.durations)])
     costate, found = np.zeros(1), []

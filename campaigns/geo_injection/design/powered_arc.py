@@ -2,15 +2,14 @@
 
 State y of twelve: place, velocity, primer vector p (the thrust's direction, minus the costate of the velocity) and its
 rate q (the costate of the place).  The steps are fixed, so an arc is a smooth function of its start and its duration:
-finite differences over it are as good as their rounding.  Importing this module imports numba, so a design imports it
-when it is wanted and not before.
+finite differences over it are as good as their rounding.
 """
 
 import numpy as np
 
-from mc_engine.flight.kernel import kernel_of
-from mc_engine.lanes.compiler import compile_inline
+from mc_engine.lanes import physics, sqrt
 from mc_engine.lanes.runge_kutta_pairs import DOP853
+from mc_engine.model import compiled_loop
 
 _NODES, _STARTS, _COLUMNS, _WEIGHTS = DOP853.tables()
 _STAGES = len(DOP853.nodes) + 1
@@ -18,15 +17,15 @@ STEP = 0.1  # canonical time: a sixtieth of the parking orbit's revolution
 Numbers = float | np.ndarray
 
 
-@compile_inline
+@physics
 def _rates(y, acceleration, out):
     """Time derivative of y under a thrust acceleration along p: eqs (1) and (16) of the source, in vectors.
 
     r'' = -r/r^3 + f p/|p|,  p' = q,  q' = -p/r^3 + 3 (r.p) r/r^5.
     """
     r2 = y[0] * y[0] + y[1] * y[1] + y[2] * y[2]
-    u3 = 1.0 / (r2 * np.sqrt(r2))
-    push = acceleration / np.sqrt(y[6] * y[6] + y[7] * y[7] + y[8] * y[8])
+    u3 = 1.0 / (r2 * sqrt(r2))
+    push = acceleration / sqrt(y[6] * y[6] + y[7] * y[7] + y[8] * y[8])
     tide = 3.0 * (y[0] * y[6] + y[1] * y[7] + y[2] * y[8]) * u3 / r2
     for k in range(3):
         out[k] = y[3 + k]
@@ -35,7 +34,7 @@ def _rates(y, acceleration, out):
         out[9 + k] = -u3 * y[6 + k] + tide * y[k]
 
 
-@compile_inline
+@physics
 def _fly_one(y, mass, duration, thrust, flow, n_steps, now, stages):
     """Carry y over one burn in place: DOP853's weights of order 8, Hairer, Norsett, Wanner, Solving ODEs I (1993).
 
@@ -56,12 +55,10 @@ def _fly_one(y, mass, duration, thrust, flow, n_steps, now, stages):
                 _rates(now, thrust / (mass - flow * (step * h + _NODES[stage] * h)), stages[stage])
 
 
+@compiled_loop
 def _fly_all(y, mass, duration, thrust, flow, n_steps, now, stages):
     for case in range(y.shape[0]):
         _fly_one(y[case], mass[case], duration[case], thrust, flow, n_steps, now, stages)
-
-
-_KERNEL = kernel_of(_fly_all)
 
 
 def fly_burns(
@@ -79,5 +76,5 @@ def fly_burns(
     mass, duration = (np.array(np.broadcast_to(column, n), dtype=np.float64) for column in (mass, duration))
     n_steps = max(8, int(np.ceil(np.abs(duration).max() / step)))
     room = np.empty(12), np.empty((_STAGES, 12))
-    _KERNEL(out, mass, duration, float(thrust), float(flow), n_steps, *room)
+    _fly_all(out, mass, duration, float(thrust), float(flow), n_steps, *room)
     return out

@@ -19,6 +19,7 @@ from numpy.polynomial import chebyshev
 
 from campaigns.geo_injection.design.continuation import optimum
 from campaigns.geo_injection.design.optimal import is_optimal
+from campaigns.geo_injection.design.powered_arc import fly_burns
 from campaigns.geo_injection.design.sequence import Sequence
 from campaigns.geo_injection.design.staged import staged
 from mc_engine.model import kept_design
@@ -109,8 +110,6 @@ def _program_of(sequence: Sequence, flown: list[tuple], optimal: bool) -> Progra
 
 def _fitted(sequence: Sequence, start: np.ndarray, mass: float, duration: float) -> tuple[float, list[Segment]]:
     """(largest error [rad], segments) of one burn from its canonical state at ignition."""
-    from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
-
     problem, unit = sequence.problem(), sequence.time_unit
     edges = np.linspace(0.0, duration, max(1, int(np.ceil(duration / _LONGEST))) + 1)
     nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)

@@ -13,6 +13,7 @@ import numpy as np
 
 from campaigns.geo_injection.design.coast import IMAGINARY, coast
 from campaigns.geo_injection.design.optimal import SOLVED, coast_hamiltonian, searched
+from campaigns.geo_injection.design.powered_arc import fly_burns
 from mc_engine.errors import ModelError
 
 Conditions = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of place and velocity [n, 3], complex too: [n, m]
@@ -88,8 +89,6 @@ def orbit(a: float, e: float, inclination: float, apse_on_node: bool = True) -> 
 
 def _ends(stage: Stage, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """States at ignition and cut-off of unknowns [n, ...]: primer vector, rate, duration, ignition, multipliers."""
-    from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
-
     on_orbit = coast(np.append(stage.reference, np.ones(6)), x[:, 7])  # its primer vector is not used
     start = np.concatenate([on_orbit[:, :6], x[:, :6]], axis=1)
     return start, fly_burns(start, stage.mass, x[:, 6], stage.thrust, stage.flow, stage.step)

@@ -3,9 +3,10 @@
 Hoang Vu Tan, 2021.  The records name these functions; each returns its value in the unit of the record.
 """
 
+from collections import namedtuple
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -14,7 +15,6 @@ from campaigns.geo_servicing.model import MODEL, nominal_start
 from campaigns.geo_servicing.phasing_plan import PUBLISHED, design
 from campaigns.geo_servicing.planned_flight import Craft
 from mc_engine.flight.flight import chosen_history
-from mc_engine.flight.kernel_parts import settings_class
 from mc_engine.studies.published_values import dispersed_cases
 
 _FOLDER = Path(__file__).resolve().parents[1]
@@ -76,7 +76,9 @@ def burn_signs() -> str:
 def craft_of(**chosen: Any) -> Craft:
     """The craft that plans are made for under these settings, the others nominal."""
     codes = [setting.code(chosen.get(setting.name, setting.default)) for setting in MODEL.settings]
-    return Craft(*nominal_start(settings_class(MODEL)(*codes, np.empty(0))))
+    names = [*(setting.symbol for setting in MODEL.settings), "tables"]
+    settings = cast("Any", namedtuple("Settings", names))
+    return Craft(*nominal_start(settings(*codes, np.empty(0))))
 
 
 @lru_cache

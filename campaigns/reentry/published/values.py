@@ -13,7 +13,7 @@ from campaigns.reentry.closed_forms import GROUND_DENSITY, SCALE_M, circular_spe
 from campaigns.reentry.critical_trajectories import critical_periapses
 from campaigns.reentry.guidance.apollo_final_phase import FLOWN
 from campaigns.reentry.model import MODEL
-from mc_engine.campaign.loading import load_campaign
+from mc_engine import load_campaign
 from mc_engine.flight.flight import chosen_case, chosen_cases, chosen_history
 from mc_engine.physics.atmosphere import us76
 from mc_engine.physics.constants import MU_EARTH, STANDARD_GRAVITY

@@ -6,6 +6,7 @@ from costate_free import shortest
 from geo_sequences import MODEL, NOMINAL, fly_cases, fly_one, history, sequence, solution
 from geo_twin import assert_same, ends, fly_twin
 
+from campaigns.geo_injection.design import powered_arc
 from campaigns.geo_injection.design.coast import coast, kepler
 from campaigns.geo_injection.design.kept_programs import SEQUENCES
 from campaigns.geo_injection.design.powered_arc import fly_burns
@@ -100,6 +101,13 @@ def test_the_rates_of_the_costates_are_those_of_the_hamiltonian():
     assert rates[6:9] == pytest.approx(y[0, 9:12], abs=1e-8)
     push = 0.1 * y[0, 6:9] / np.linalg.norm(y[0, 6:9])
     assert rates[3:6] == pytest.approx(push - y[0, :3] / (y[0, :3] @ y[0, :3]) ** 1.5, abs=1e-8)
+
+
+def test_the_arc_has_the_bits_of_its_interpreted_twin(monkeypatch):
+    y = np.array([[1.0, 0.1, -0.2, 0.1, 1.15, 0.3, 0.4, -0.8, 0.2, 0.3, 0.1, -0.4]]) * [[1.0], [1.01]]
+    flown = fly_burns(y, [1.0, 0.9], [0.9, -0.7], 0.1, 0.03)
+    monkeypatch.setattr(powered_arc, "_fly_all", powered_arc._fly_all.__wrapped__)
+    np.testing.assert_array_equal(flown, fly_burns(y, [1.0, 0.9], [0.9, -0.7], 0.1, 0.03))
 
 
 @pytest.mark.parametrize("dt", [-7.0, -0.3, 0.0, 1e-4, 2.0, 25.0])

@@ -11,9 +11,9 @@ from test_kernel import fall, speed
 import mc_engine
 from mc_engine.campaign.search import SHIPPED
 from mc_engine.flight import kernel
-from mc_engine.flight.kernel_key import Recorder, kernel_key
 from mc_engine.flight.kernel_parts import parts_of
 from mc_engine.lanes import kernel_cache
+from mc_engine.lanes.kernel_key import Recorder, kernel_key
 from mc_engine.model import load_model
 from tests.mc_engine.store.small_run import ENVIRONMENT
 

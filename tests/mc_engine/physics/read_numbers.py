@@ -4,10 +4,10 @@ from functools import cache
 
 import numpy as np
 
-from mc_engine.flight.kernel import kernel_of
 from mc_engine.lanes.composed import blocks_in
 from mc_engine.lanes.kernel_data import Blocks, gathered, hand_over
 from mc_engine.lanes.tuples import load, store
+from mc_engine.model import compiled_loop
 
 
 @cache
@@ -24,7 +24,7 @@ def _kernel(function, n_arguments, width):
         for first in range(0, x.shape[1], width):
             store(out, first, function(load(x[0], first, width), load(x[1], first, width)))
 
-    return kernel_of(of_one if n_arguments == 1 else of_two), blocks
+    return compiled_loop(of_one if n_arguments == 1 else of_two), blocks
 
 
 def compiled(function, *arguments, width=8):

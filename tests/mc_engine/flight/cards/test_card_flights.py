@@ -190,7 +190,6 @@ def erring(parameters, settings, data, key, cases, time, status, state, metrics,
     if cases[0] == 7.0:
         raise ValueError
     time[0], status[0], state[0, 0], metrics[0, 0] = cases[0], 0.0, 0.0, 0.0
-    return 0
 
 
 def test_a_flight_that_ends_with_an_error_is_told_as_on_the_processor(tmp_path, monkeypatch):

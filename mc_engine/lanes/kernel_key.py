@@ -37,15 +37,16 @@ _HAS_DOCSTRING = 0x4000000  # flag of code objects from Python 3.14 on; before, 
 _PASSED_BY_CALLER = 0x04 | 0x08  # flags of *args and **named
 
 
-def kernel_key(model_parts: Any, template: str) -> tuple[str, bool]:
-    """(digest of all that a kernel is compiled from, whether every object of the model was known).
+def kernel_key(parts: Any, template: str) -> tuple[str, bool]:
+    """(digest of all that a kernel is compiled from, whether every object in the parts was known).
 
-    model_parts : what `parts_of` gives with a `Recorder`.  template : source of the kernel's file.
+    parts : of a model, as `parts_of` gives them with a `Recorder`; of a `compiled_loop`, its function as physics.
+    template : source of the kernel's file
     """
     names: frozenset[str] = frozenset()
     while True:
         walk = _Walk(names)
-        description = walk.value(model_parts)
+        description = walk.value(parts)
         if walk.names == names:
             break
         names = walk.names  # physics that a namespace leads to may read further attributes of another
