@@ -7,7 +7,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from mc_engine.durable_file import write_durably
-from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, finite
+from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, finite, hidden_by_ties
 from mc_engine.studies.comparison import Comparison, VerdictChange
 from mc_engine.studies.run_changes import Difference
 from mc_engine.units import convert
@@ -34,7 +34,6 @@ from reports.text.numbers import SPACE, axis_label, count, fixed, number, percen
 
 LEAST_P = 1e-12  # a smaller p-value means no more
 ROUNDING = 1e-12  # of a mean: a smaller standard deviation is none
-OF_TIES = 1e-6  # a size and its interval no farther from no change: that of a test whose statistic jumps there
 GLOSSARY = Terms(
     (
         (
@@ -278,8 +277,7 @@ def _number_cell(value: float, scale: float) -> Cell:
 
 def _size_cell(estimate: Estimate, none: float, significant: bool) -> Cell:
     """The size of a change; of one that is significant, but whose interval is no change alone, that ties hide it."""
-    ends = np.array(astuple(estimate))
-    if significant and finite(estimate) and (np.abs(ends - none) <= OF_TIES).all():
+    if hidden_by_ties(estimate, none, significant):
         return Cell("–", small="ties")
     return _estimate_cell(estimate)
 

@@ -128,7 +128,9 @@ def test_a_case_ends_where_its_curve_does(tmp_path):
     assert 3.1 < flight.origin.arguments[0] < 3.6
     at = flight.origin.arguments[0]
     said = origin_sentence(flight.origin)
-    assert re.match(rf"model\.py, line \d+: `.*THRUST.*`: the curve thrust\.csv, left at its end, at {at!r} is not", said)
+    assert re.match(
+        rf"model\.py, line \d+: `.*THRUST.*`: the curve thrust\.csv, left at its end, at {at!r} is not", said
+    )
     assert "curves.py" not in said
 
 
