@@ -56,8 +56,8 @@ def test_the_unit_that_was_meant_is_found(written, meant):
 @pytest.mark.parametrize(
     ("name", "meant"),
     [("h_mtr", "h_m"), ("h_mtrs", "h_m"), ("h_kmm", "h_km"), ("t_secs", "t_s"), ("t_msec", "t_ms"), ("t_hrs", "t_h"),
-     ("t_minutes", "t_min"),     ("p_kpas", "p_kpa"), ("n_rpms", "n_rpm"), ("angle_dge", "angle_deg"), ("angle_arcsc", "angle_arcsec"),
-     ("k_w_m2k", "k_w_m2_k")],
+     ("t_minutes", "t_min"), ("p_kpas", "p_kpa"), ("n_rpms", "n_rpm"), ("angle_dge", "angle_deg"),
+     ("angle_arcsc", "angle_arcsec"), ("k_w_m2k", "k_w_m2_k")],
 )  # fmt: skip
 def test_a_misspelt_ending_is_answered_with_the_unit_that_was_meant(name, meant):
     with pytest.raises(ModelError, match=f'did you mean "{meant}"'):
