@@ -20,6 +20,7 @@ from reports.text.numbers import (
     spelled,
     with_unit,
 )
+from reports.text.source_places import of_source
 
 TONES = {"pass": "good", "fail": "bad", "not demonstrable": "open"}
 REASONS_SHOWN = 20
@@ -181,7 +182,7 @@ def dispersed_table(records: Iterable[Mapping[str, Any]], caption: str) -> Table
         (
             Cell(axis_label(record["name"], record["unit"]), small=record["description"]),
             Cell(distribution_text(record)),
-            Cell(record["source"] or "not stated"),
+            Cell(of_source(record["source"] or "not stated")),
         )
         for record in records
     )
@@ -229,7 +230,7 @@ def input_table(flown: Flown) -> Table | None:
                 Cell(exact(nominal) if nominal != "" else "–"),
                 Cell(distribution_text(record)),
                 Cell(drawn),
-                Cell(str(record.get("source") or "not stated"), small=str(record.get("note") or "")),
+                Cell(of_source(str(record.get("source") or "not stated")), small=str(record.get("note") or "")),
             )
         )
     return Table("Dispersed inputs", columns, tuple(rows)) if rows else None

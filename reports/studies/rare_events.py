@@ -27,6 +27,7 @@ from reports.sections.figure_blocks import thinned_by_outcome
 from reports.sections.provenance import origin_table
 from reports.sections.tables import dispersed_table
 from reports.text.numbers import SPACE, axis_label, count, exact, named, number, percent, same_lengths, with_unit, words
+from reports.text.source_places import of_source
 
 CLASSES = ("drawn from the dispersions, not failed", "failed")
 DESIGN_POINTS = (
@@ -143,7 +144,7 @@ def _estimate_facts(record: RareEventRecord) -> tuple[tuple[str, str], ...]:
 
 def _verdict_card(result: dict[str, Any]) -> Card:
     allowed = 1.0 - result["requirement"]["share"]
-    source = f" Source: {result['requirement']['source']}." if result["requirement"]["source"] else ""
+    source = f" Source: {of_source(result['requirement']['source'])}." if result["requirement"]["source"] else ""
     answer, tone = _judged(result)
     return Card(
         label=result["requirement"]["name"],
