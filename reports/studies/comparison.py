@@ -354,7 +354,7 @@ def _verdict_table(comparison: Comparison) -> Table | None:
 
 
 def _tone(change: VerdictChange) -> str:
-    if change.worse:
+    if change.worse or change.after == "fail":
         return "bad"
     return "good" if change.after == "pass" else ""
 

@@ -82,6 +82,9 @@ def test_requirements_come_first_and_in_words():
     assert (card.label, card.answer, card.tone) == ("force", "fail → pass", "good")
     assert card.detail == f"{passed[0]:,} → {passed[1]:,} of {len(a.table):,} cases inside".replace(",", "\u202f")
     assert "force: fail → pass" in document.subtitle
+    tones = {row[0].text: (row[2].text, row[2].tone) for row in next(iter(tables(document).values())).rows}
+    assert tones["force"] == ("pass", "good")
+    assert tones["all at once"] == ("fail", "bad")  # as before; it is no less a failure for that
 
 
 def test_shifts_of_thousands_of_sigma_and_of_a_few_are_both_seen_in_the_figure():
