@@ -72,7 +72,7 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
         spread, limits = summary.spread, flown.limits(name)
         median, nominal = summary.at(0.5), flown.nominal_value(name)
         rest = [f"nominal {number(nominal, 4, spread)}"] if nominal is not None else []
-        rest.append(f"median {number(median.value, 4, spread) if median else '–'}")
+        rest += [f"median {number(median.value, 4, spread)}"] if median else []
         demonstrated = _demonstrated(flown, name, limits)
         if limits == Limits() or limits.two_sided:
             low, high = (number(end, 4, spread) for end in (summary.minimum, summary.maximum))
@@ -161,8 +161,9 @@ def warnings(flown: Flown) -> tuple[str, ...]:
         )
     if not flown.random:
         sentences.append(
-            f"The design is “{flown.design}”: its cases are chosen, not drawn at random. Fractions and percentiles "
-            "below describe these cases and do not estimate probabilities."
+            f"The design is “{flown.design}”: its cases are chosen, not drawn at random. "
+            f"Fractions {'' if flown.chosen else 'and percentiles '}below describe these cases and do not estimate "
+            "probabilities."
         )
     return tuple(sentences)
 
