@@ -22,7 +22,7 @@ from reports.document.blocks import (
 )
 from reports.drawing.marks import Axis, Drawing, Limit, Line, Plot, Points, intervals, nominal_ring
 from reports.drawing.palette import BLUE, INK, PURPLE, VERMILION
-from reports.figures.clouds import case_scatter
+from reports.figures.clouds import MOST, case_scatter
 from reports.sections.figure_blocks import thinned_by_outcome
 from reports.sections.provenance import origin_table
 from reports.sections.tables import dispersed_table
@@ -215,6 +215,7 @@ def _failure_figure(record: RareEventRecord) -> FigureBlock | None:
             for key, name, colour in DESIGN_POINTS
             if shown[0].get(key) is not None
         ],
+        fewer=MOST,  # failed cases are not few here: larger, they would look like more than they are
         form="Failed cases over two inputs",
     )
     caption = (

@@ -130,6 +130,8 @@ def test_failed_cases_are_a_scatter_of_the_two_inputs_they_lie_farthest_in(tmp_p
     ordinary, failed, likeliest = figure.drawing.plots[0].marks
     np.testing.assert_array_equal(failed.x, cases["b"][700:])
     np.testing.assert_array_equal(failed.y, cases["c"][700:])
+    assert (failed.size, failed.opacity) == (ordinary.size, ordinary.opacity)
+    assert (failed.colour, failed.sign) != (ordinary.colour, ordinary.sign)
     assert (ordinary.x.size, likeliest.x[0], likeliest.y[0]) == (500, -5.0, 3.0)
     assert classes(figure.drawing) == {"drawn from the dispersions, not failed": 500, "failed": 300}
 
