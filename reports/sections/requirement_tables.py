@@ -166,7 +166,7 @@ def risk_table(flown: Flown) -> Table | None:
 def _risk_row(verdict: Verdict, among: int) -> tuple[Cell, ...]:
     outside = verdict.tried - verdict.passed
     allowed = (
-        Cell("none suffices", -1.0) if verdict.accepted is None else Cell(count(verdict.accepted), verdict.accepted)
+        Cell("too few cases", -1.0) if verdict.accepted is None else Cell(count(verdict.accepted), verdict.accepted)
     )
     if verdict.looked:
         consumer = Cell(f"below {percent(1.0 - verdict.confidence)}", 1.0 - verdict.confidence)
