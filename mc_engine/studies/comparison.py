@@ -51,7 +51,8 @@ class VerdictChange:
     """A requirement's verdict in each run, by that run's own limits; None where a run has no such requirement.
 
     inside : by run, how many of its cases are inside the limits, of all.
-    notes : by run, of the joint verdict, which requirement fails it or is the only one.
+    notes : by run, what is to be known of it: which requirement fails the joint verdict or is the only one, and whether
+        run B requires something else.
     """
 
     name: str
@@ -259,7 +260,8 @@ def _verdict_changes(manifests: Any, tables: Any, ok: Any) -> tuple[VerdictChang
         ends = [_verdict_on(name, judged) for judged in judged_runs]
         before, after = (None if verdict is None else verdict.outcome for verdict in ends)
         a, b = (None if verdict is None else (verdict.passed, verdict.tried) for verdict in ends)
-        changes.append(VerdictChange(name, before, after, (a, b), (_note(name, ends[0]), _note(name, ends[1]))))
+        notes = _note(name, ends[0], None), _note(name, ends[1], ends[0])
+        changes.append(VerdictChange(name, before, after, (a, b), notes))
     return tuple(changes)
 
 
@@ -279,10 +281,16 @@ def _verdict_on(name: str, judged: Mapping[str, Verdict]) -> Verdict | None:
     return judged.get(name)
 
 
-def _note(name: str, verdict: Verdict | None) -> str:
-    if verdict is None or verdict.name == name:
-        return verdict.failing_words if verdict else ""
-    return f"{verdict.name} is the only requirement"
+def _note(name: str, verdict: Verdict | None, before: Verdict | None) -> str:
+    """What a reader must know of a verdict that is next to the one `before`; "" for nothing."""
+    if verdict is None or verdict.name != name:
+        return f"{verdict.name} is the only requirement" if verdict else ""
+    if before is None or not verdict.metric:
+        return verdict.failing_words
+    if (before.metric, before.at_least, before.at_most) != (verdict.metric, verdict.at_least, verdict.at_most):
+        return "the limit is different"
+    asked, asks = (before.share, before.confidence), (verdict.share, verdict.confidence)
+    return "the required probability is different" if asked != asks else ""
 
 
 def _p_values(metrics: Any, shares: Any) -> list[float]:

@@ -32,6 +32,7 @@ def test_counts_by_the_limits_of_one_run_and_of_each_are_told_apart(tmp_path):
     before, after = counted.removeprefix("fuel: ").split(",")[0].split(" -> ")
     assert before == after  # the same cases
     assert not verdict.startswith(f"requirement fuel: {before}")
+    assert verdict.endswith("of 400 cases inside; in B the limit is different")
 
 
 def test_a_shift_is_found_in_the_metric_that_moved_alone(tmp_path):

@@ -80,7 +80,8 @@ def test_requirements_come_first_and_in_words():
     passed = [int((run.table["peak_force_n"] <= limit).sum()) for run, limit in ((a, 20.0), (b, 1e3))]
     card = document.verdicts[0]
     assert (card.label, card.answer, card.tone) == ("force", "fail → pass", "good")
-    assert card.detail == f"{passed[0]:,} → {passed[1]:,} of {len(a.table):,} cases inside".replace(",", "\u202f")
+    counts = f"{passed[0]:,} → {passed[1]:,} of {len(a.table):,}".replace(",", "\u202f")
+    assert card.detail == f"{counts} cases inside; in B the limit is different"
     assert "force: fail → pass" in document.subtitle
     tones = {row[0].text: (row[2].text, row[2].tone) for row in next(iter(tables(document).values())).rows}
     assert tones["force"] == ("pass", "good")
