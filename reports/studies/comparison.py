@@ -1,5 +1,6 @@
 """What `mc-engine compare A B --report FILE` writes: the comparison of two runs as a page or as a PDF."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import astuple
 from pathlib import Path, PurePosixPath
@@ -133,7 +134,7 @@ def _change_sentence(comparison: Comparison) -> str:
 
 
 def _run_facts(comparison: Comparison) -> tuple[tuple[str, str], ...]:
-    reason = comparison.pairing.reason
+    reason = re.sub(r"(?<=\d),(?=\d{3})", SPACE, comparison.pairing.reason)
     facts = []
     for letter, name, cases, ok, created in zip(
         "AB", _short_names(comparison.names), comparison.cases, comparison.ok, comparison.created, strict=True

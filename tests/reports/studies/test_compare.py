@@ -83,6 +83,7 @@ def test_requirements_come_first_and_in_words():
     counts = f"{passed[0]:,} → {passed[1]:,} of {len(a.table):,}".replace(",", "\u202f")
     assert card.detail == f"{counts} cases inside; in B the limit is different"
     assert "force: fail → pass" in document.subtitle
+    assert dict(document.facts)["Cases"] == "Paired: 1\u202f200 cases have the same inputs in both runs"
     tones = {row[0].text: (row[2].text, row[2].tone) for row in next(iter(tables(document).values())).rows}
     assert tones["force"] == ("pass", "good")
     assert tones["all at once"] == ("fail", "bad")  # as before; it is no less a failure for that
