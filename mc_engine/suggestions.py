@@ -35,16 +35,20 @@ _OTHER_NAMES = {
     "degree": "deg",
     "degrees": "deg",
     "hours": "h",
+    "hrs": "h",
     "kilograms": "kg",
     "kilometers": "km",
     "kilometres": "km",
     "meters": "m",
     "metres": "m",
+    "minutes": "min",
+    "mtrs": "m",
     "newton": "N",
     "percent": "%",
     "radians": "rad",
     "seconds": "s",
     "amperes": "A",
+    "amps": "A",
     "arcminutes": "arcmin",
     "arcseconds": "arcsec",
     "joules": "J",
@@ -52,7 +56,9 @@ _OTHER_NAMES = {
     "dps": "deg/s",
     "kmps": "km/s",
     "mps": "m/s",
-    "sec": "s",
+    "secs": "s",
+    "msecs": "ms",
+    "usecs": "us",
     "milliradians": "mrad",
     "newtons": "N",
     "pascals": "Pa",
@@ -67,16 +73,27 @@ _SHORTEST = 3  # letters; too many words of two letters, such as kg and km, diff
 
 def nearest(word: str, allowed: Iterable[str]) -> str | None:
     """The allowed word that `word` was probably meant to be, or None."""
-    plain = {name.lower().replace("-", "_"): name for name in allowed}
-    typed = word.lower().replace("-", "_").replace(" ", "_")
-    synonym = (_OTHER_NAMES.get(typed) or _OTHER_NAMES.get(f"{typed}s", "")).lower()
-    if synonym and synonym in plain:
-        return plain[synonym]
-    if typed in plain:
-        return plain[typed]
+    plain, typed = _by_plain_name(allowed), _plain(word)
+    if known := synonym(word, plain.values()) or plain.get(typed):
+        return known
     slips = [name for name in plain if _is_one_edit(typed, name)]
     matches = get_close_matches(typed, slips or plain, n=1, cutoff=0.0 if slips else 0.6)
     return plain[matches[0]] if matches else None
+
+
+def synonym(word: str, allowed: Iterable[str]) -> str | None:
+    """The allowed word that `word` is another name of, or None."""
+    typed = _plain(word)
+    meant = _OTHER_NAMES.get(typed) or _OTHER_NAMES.get(f"{typed}s", "")
+    return _by_plain_name(allowed).get(meant.lower()) if meant else None
+
+
+def _plain(word: str) -> str:
+    return word.lower().replace("-", "_").replace(" ", "_")
+
+
+def _by_plain_name(allowed: Iterable[str]) -> dict[str, str]:
+    return {name.lower().replace("-", "_"): name for name in allowed}
 
 
 def _is_one_edit(a: str, b: str) -> bool:

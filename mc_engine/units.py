@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from mc_engine.errors import ModelError
-from mc_engine.suggestions import nearest
+from mc_engine.suggestions import nearest, synonym
 
 Number = TypeVar("Number", float, np.ndarray)
 
@@ -94,6 +94,7 @@ _BY_QUANTITY: dict[str, dict[str, float]] = {
     "rate of magnetic flux density": {"T/s": 1.0, "nT/s": 1e-9},
     "magnetic dipole": {"A m^2": 1.0, "mA m^2": 1e-3},
 }  # fmt: skip
+_SHORT = 3  # letters of a unit
 _LONGEST_ENDING = 5  # words of a unit at the end of a name, as in _n_m_s or _deg_sqrt_h
 _ALSO_WRITTEN = str.maketrans(
     {"²": "2", "³": "3", "µ": "u", "μ": "u", "°": "deg", "Ω": "ohm"} | dict.fromkeys(" ^*·()_")
@@ -125,7 +126,15 @@ def nearest_unit(unit: str, allowed: Iterable[str]) -> str | None:
     names = [name for name in allowed if name]
     squeezed = {_squeezed(name): name for name in names}
     without_bars = {short.replace("/", ""): name for short, name in squeezed.items()}
-    return squeezed.get(_squeezed(unit)) or without_bars.get(_squeezed(unit)) or nearest(unit, names)
+    exact = squeezed.get(_squeezed(unit)) or without_bars.get(_squeezed(unit)) or synonym(unit, names)
+    return exact or nearest(unit, [name for name in names if _may_be_misspelt(name, unit)])
+
+
+def _may_be_misspelt(unit: str, typed: str) -> bool:
+    """Whether a slip may make one of the other: another letter in a short unit, as in kph and kPa, is another unit."""
+    letters, given = (_squeezed(name).replace("/", "") for name in (unit, typed))
+    long = len(letters) > _SHORT and "/" not in unit
+    return letters.isalpha() and (long or set(letters) == set(given) or given == f"{letters}s")
 
 
 def unit_hint(unit: str) -> str:

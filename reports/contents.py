@@ -30,7 +30,7 @@ from reports.sections.requirement_tables import requirement_blocks
 from reports.sections.scenario import scenario_blocks
 from reports.sections.single_cases import ANCHOR as CASES
 from reports.sections.single_cases import case_blocks, case_data
-from reports.sections.tables import fixed_table, quantile_table, status_table, summary_table
+from reports.sections.tables import fixed_table, quantile_table, range_table, status_table, summary_table
 
 
 def build(run: Run, name: str) -> Document:
@@ -112,6 +112,6 @@ def _metrics(flown: Flown) -> Iterator[Block | str | None]:
         yield "The model declares no metric."
         return
     yield case_table(flown)
-    yield summary_table(flown)
+    yield range_table(flown) if flown.chosen else summary_table(flown)
     yield quantile_table(flown)
     yield from other_distributions(flown)

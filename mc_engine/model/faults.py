@@ -219,7 +219,7 @@ def origin_sentence(origin: Origin, who: str = "") -> str:
     if not origin.places:
         return happened
     ours = [place for place in origin.places if is_the_users(Path(place.file))] or [origin.places[-1]]
-    if ours[0] is not origin.places[0]:
+    if ours[0] is not origin.places[0] and not _is_look_up(origin):
         happened = f"in {origin.places[0]}, {happened}"
     if len(ours) > 1:
         happened += f", called by {ours[-1]}"
@@ -231,7 +231,7 @@ def _operation(origin: Origin) -> str:
         return origin.operation
     result = "not a number" if math.isnan(origin.result) else "infinite"
     values = [f"{argument:.6g}" for argument in origin.arguments if isinstance(argument, float | int)]
-    if " " in origin.operation:  # a curve in words; all digits tell an argument from the end of the points
+    if _is_look_up(origin):  # all digits tell an argument from the end of the points
         at = ", ".join(repr(float(argument)) for argument in origin.arguments)
         return f"{origin.operation} at {at} is {result}"
     if origin.operation in _FUNCTIONS:
@@ -239,3 +239,8 @@ def _operation(origin: Origin) -> str:
     if origin.operation.isidentifier():
         return f"{origin.operation}({', '.join(values)}) is {result}"
     return f"{f' {origin.operation} '.join(values)} is {result}"
+
+
+def _is_look_up(origin: Origin) -> bool:
+    """Whether the operation is a curve in words: the user's own data, whichever line of the engine reads them."""
+    return " " in origin.operation

@@ -2,7 +2,7 @@
 to what a curve needs, and made into what a look-up reads: a row of numbers for each point, or each cell of a grid."""
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from mc_engine.suggestions import hint, listed
 from mc_engine.units import UNITS, unit_hint, unit_of, units_meant
 
 LARGEST = 1e300  # of the arguments
+NARROWEST = 1e-300  # range of the arguments
 
 
 def columns_of(path: Path, wanted: Mapping[str, str | None]) -> dict[str, np.ndarray]:
@@ -125,12 +126,17 @@ def refuse_points(words: str, x: np.ndarray, values: np.ndarray, n: int) -> None
     if wrong.size:
         i = int(wrong[0])
         raise ModelError(f"{words}: the argument must rise, but {x[i + 1]:g} follows {x[i]:g} (SI)")
+    if x[-1] - x[0] < NARROWEST:
+        raise ModelError(f"{words}: all arguments lie within {x[-1] - x[0]:.3g} (SI); spread them over {NARROWEST:g}")
 
 
-def refuse_steep(words: str, rows: np.ndarray) -> None:
-    """ModelError where a slope is infinite: arguments next to each other as closely as floats are."""
+def finite_rows(words: str, rows_of: Callable[..., np.ndarray], *points: np.ndarray) -> np.ndarray:
+    """What a look-up reads, made by `rows_of`; ModelError where points lie so close that a number of it is infinite."""
+    with np.errstate(all="ignore"):
+        rows = rows_of(*points)
     if not np.isfinite(rows).all():
         raise ModelError(f"{words}: two points lie so close that the slope between them is no number")
+    return rows
 
 
 def grid_of(words: str, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -149,8 +155,7 @@ def grid_of(words: str, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np
 
 def linear_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """(value, slope behind it) of each point; the last one has no slope, as nothing is behind it."""
-    with np.errstate(over="ignore"):
-        return np.column_stack([y, np.append(np.diff(y) / np.diff(x), 0.0)])
+    return np.column_stack([y, np.append(np.diff(y) / np.diff(x), 0.0)])
 
 
 def cubic_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -27,13 +27,13 @@ from mc_engine.physics.curve_points import (
     columns_of,
     cubic_cells,
     cubic_rows,
+    finite_rows,
     grid_of,
     linear_cells,
     linear_rows,
     nearest_cells,
     nearest_rows,
     refuse_points,
-    refuse_steep,
     turnovers,
 )
 from mc_engine.physics.vectors import Vector
@@ -107,8 +107,7 @@ def _through(xs: np.ndarray, ys: np.ndarray, kind: str, outside: str, path: Path
     refuse_points(words, xs, ys, xs.size)
     axis = _axis(turnovers(xs) if kind == "nearest" else xs)
     axis[_HEADER - 1] = axis.size
-    rows = _ROWS[kind](xs, ys)
-    refuse_steep(words, rows[:, :2])
+    rows = finite_rows(words, _ROWS[kind], xs, ys)
     block = DataBlock(np.concatenate([axis, rows.ravel()]), path)
     return Curve(_bounded(_AT[kind], block, outside), block, words, kind, outside)
 
@@ -177,8 +176,7 @@ def surface(
     first[_HEADER - 1] = first.size
     second[_HEADER - 1] = first.size + second.size
     second[5:7] += first.size
-    cells = _CELLS[kind](xs, ys, zs)
-    refuse_steep(words, cells)
+    cells = finite_rows(words, _CELLS[kind], xs, ys, zs)
     block = DataBlock(np.concatenate([first, second, [cells.shape[1], 0.0, 0.0, 0.0], cells.ravel()]), path)
     return Curve(_bounded_surface(_ON[kind], block, outside), block, words, kind, outside)
 

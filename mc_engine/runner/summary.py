@@ -138,7 +138,7 @@ def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, 
     """Summary of every metric, or of those named; StoreError for a name that is no metric.
 
     Quantiles are the usual ones and those between which a case lies with the probability of [report]; each bound of a
-    quantile holds with its confidence.
+    quantile holds with its confidence.  Cases that were chosen, as those of a grid, have none.
 
     A failed case has no value, whatever its row contains.
     """
@@ -147,11 +147,11 @@ def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, 
     for name in names:
         if name not in known:
             raise StoreError(f'{store.path}: there is no metric "{name}"; there are {", ".join(known) or "none"}')
-    from mc_engine.statistics.order_statistics import QUANTILES
+    from mc_engine.statistics import CHOSEN_DESIGNS, QUANTILES
 
     stated = ReportSection(**store.manifest.get("report", {}))
     outer = (round(0.5 * (1.0 + sign * stated.probability), 12) for sign in (-1.0, 1.0))
-    probabilities = tuple(sorted({*QUANTILES, *outer}))
+    probabilities = () if _design(store) in CHOSEN_DESIGNS else tuple(sorted({*QUANTILES, *outer}))
     return streamed(store, names, probabilities=probabilities, confidence=2.0 * stated.confidence - 1.0).summaries
 
 
@@ -177,7 +177,7 @@ def streamed(
         requirements=requirements,
         design=_design(store),
         looked=was_looked_at(store.manifest, store.n_cases),
-        probabilities=probabilities or QUANTILES,
+        probabilities=QUANTILES if probabilities is None else probabilities,
         confidence=confidence,
     )
 

@@ -5,6 +5,7 @@ from mc_engine.statistics.maps import SurfaceMap, map_metric
 from mc_engine.statistics.normality import Normality, normality
 from mc_engine.statistics.order_statistics import QUANTILES, Quantile, quantile, quantile_ranks
 from mc_engine.statistics.requirements import (
+    CHOSEN_DESIGNS,
     SAMPLING_DESIGNS,
     Verdict,
     judge,
@@ -15,6 +16,7 @@ from mc_engine.statistics.summary import Summary, summarize
 from mc_engine.statistics.worst import worst_cases
 
 __all__ = [
+    "CHOSEN_DESIGNS",
     "QUANTILES",
     "SAMPLING_DESIGNS",
     "Normality",

@@ -34,6 +34,7 @@ from mc_engine.statistics.moments import in_units, near_one
 FEWEST = 10  # numbers in each run, or pairs, for a test of a metric
 MOST_CASES = 200_000
 MOST_DECIMALS = 9  # of an estimate that is printed
+_OF_TIES = 1e-6  # a size and its interval no farther from no change: that of a test whose statistic jumps there
 _ROUNDING = 1e-12  # of the largest number: spread below it is rounding
 
 
@@ -300,3 +301,8 @@ def _paired_share(lost: int, gained: int, n: int, confidence: float) -> Estimate
 def finite(estimate: Estimate) -> bool:
     """Whether the estimate is defined."""
     return isfinite(estimate.value)
+
+
+def hidden_by_ties(estimate: Estimate, unchanged: float, significant: bool) -> bool:
+    """Whether so many cases have equal values that the size of a significant change, with its interval, is none."""
+    return significant and all(abs(end - unchanged) <= _OF_TIES for end in astuple(estimate))

@@ -32,6 +32,8 @@ JOINT = "all at once"
 
 # Designs whose cases are a sample of the dispersions, so that a share of cases estimates a probability.
 SAMPLING_DESIGNS = ("mc", "lhs", "sobol", "halton")  # the last one of runs of older versions
+# Designs whose every case is chosen: percentiles of them would be of that choice.
+CHOSEN_DESIGNS = ("grid", "one_at_a_time")
 
 
 class ShareLimits(Protocol):

@@ -18,6 +18,7 @@ from mc_engine.section import ReportSection
 from mc_engine.statistics.change_tests import MetricChange, ShareChange, holm, metric_change, share_change
 from mc_engine.statistics.requirements import (
     FAIL,
+    JOINT,
     NOT_DEMONSTRABLE,
     PASS,
     SAMPLING_DESIGNS,
@@ -50,14 +51,15 @@ class VerdictChange:
     """A requirement's verdict in each run, by that run's own limits; None where a run has no such requirement.
 
     inside : by run, how many of its cases are inside the limits, of all.
-    failing_words : by run, of the joint verdict, which requirement fails it; see `Verdict`.
+    notes : by run, what is to be known of it: which requirement fails the joint verdict or is the only one, and whether
+        run B requires something else.
     """
 
     name: str
     before: str | None
     after: str | None
     inside: tuple[tuple[int, int] | None, tuple[int, int] | None] = (None, None)
-    failing_words: tuple[str, str] = ("", "")
+    notes: tuple[str, str] = ("", "")
 
     @property
     def words(self) -> str:
@@ -72,7 +74,7 @@ class VerdictChange:
             return ""
         (passed, tried), (now, of) = a, b
         before = counted(passed) if tried == of else f"{counted(passed)} of {counted(tried)}"
-        because = [f"; in {run} {words}" for run, words in zip("AB", self.failing_words, strict=True) if words]
+        because = [f"; in {run} {words}" for run, words in zip("AB", self.notes, strict=True) if words]
         return f"{before} → {counted(now)} of {counted(of)} cases inside{''.join(because)}"
 
     @property
@@ -213,8 +215,10 @@ def pair_cases(tables: tuple[pd.DataFrame, pd.DataFrame], inputs: tuple[list[str
         return Pairing(False, everything, f"not paired: {why}")
     n = int(same.sum())
     rest = len(tables[0]) + len(tables[1]) - 2 * n
-    remainder = f"; {rest} cases that only one run has, or with other inputs, are left out" if rest else ""
-    return Pairing(True, (first[same], second[same]), f"paired: {n} cases have the same inputs in both runs{remainder}")
+    remainder = f"; {rest:,} cases that only one run has, or with other inputs, are left out" if rest else ""
+    return Pairing(
+        True, (first[same], second[same]), f"paired: {n:,} cases have the same inputs in both runs{remainder}"
+    )
 
 
 def _equal(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -252,22 +256,43 @@ def _cases_inside(manifest: Mapping[str, Any], values: list[dict[str, np.ndarray
 
 
 def _verdict_changes(manifests: Any, tables: Any, ok: Any) -> tuple[VerdictChange, ...]:
-    judged_runs: list[dict[str, Verdict]] = []
-    for manifest, table, flown in zip(manifests, tables, ok, strict=True):
-        design = str(manifest["campaign"].get("design", "mc"))
-        records = manifest.get("requirements", []) if design in SAMPLING_DESIGNS else []
-        looked = was_looked_at(manifest, len(table))
-        columns = {record["metric"]: table[record["metric"]].to_numpy(dtype=np.float64) for record in records}
-        judged, joint = judge_all(records, columns.__getitem__, flown, design, looked)
-        judged_runs.append({verdict.name: verdict for verdict in [*judged, *([joint] if joint else [])]})
+    judged_runs = [_judged(*run) for run in zip(manifests, tables, ok, strict=True)]
     changes = []
-    for name in dict.fromkeys([*judged_runs[0], *judged_runs[1]]):
-        ends = [verdicts.get(name) for verdicts in judged_runs]
+    for name in dict.fromkeys(verdict for judged in judged_runs for verdict in judged):
+        ends = [_verdict_on(name, judged) for judged in judged_runs]
         before, after = (None if verdict is None else verdict.outcome for verdict in ends)
         a, b = (None if verdict is None else (verdict.passed, verdict.tried) for verdict in ends)
-        failing = _both(ends, lambda verdict: "" if verdict is None else verdict.failing_words)
-        changes.append(VerdictChange(name, before, after, (a, b), failing))
+        notes = _note(name, ends[0], None), _note(name, ends[1], ends[0])
+        changes.append(VerdictChange(name, before, after, (a, b), notes))
     return tuple(changes)
+
+
+def _judged(manifest: Mapping[str, Any], table: pd.DataFrame, flown: np.ndarray) -> dict[str, Verdict]:
+    """The verdicts of a run by the names of its requirements, the joint one among them."""
+    design = str(manifest["campaign"].get("design", "mc"))
+    records = manifest.get("requirements", []) if design in SAMPLING_DESIGNS else []
+    columns = {record["metric"]: table[record["metric"]].to_numpy(dtype=np.float64) for record in records}
+    judged, joint = judge_all(records, columns.__getitem__, flown, design, was_looked_at(manifest, len(table)))
+    return {verdict.name: verdict for verdict in [*judged, *([joint] if joint else [])]}
+
+
+def _verdict_on(name: str, judged: Mapping[str, Verdict]) -> Verdict | None:
+    """A verdict of a run, None without it; the joint one of a run with a single requirement is the verdict on that."""
+    if name == JOINT and len(judged) == 1:
+        return next(iter(judged.values()))
+    return judged.get(name)
+
+
+def _note(name: str, verdict: Verdict | None, before: Verdict | None) -> str:
+    """What a reader must know of a verdict that is next to the one `before`; "" for nothing."""
+    if verdict is None or verdict.name != name:
+        return f"{verdict.name} is the only requirement" if verdict else ""
+    if before is None or not verdict.metric:
+        return verdict.failing_words
+    if (before.metric, before.at_least, before.at_most) != (verdict.metric, verdict.at_least, verdict.at_most):
+        return "the limit is different"
+    asked, asks = (before.share, before.confidence), (verdict.share, verdict.confidence)
+    return "the required probability is different" if asked != asks else ""
 
 
 def _p_values(metrics: Any, shares: Any) -> list[float]:

@@ -5,11 +5,12 @@ from dataclasses import astuple
 
 import numpy as np
 
-from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, finite
+from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, finite, hidden_by_ties
 from mc_engine.studies.comparison import Comparison
 from mc_engine.studies.run_changes import changed_lines
 
 _LEAST_P = 1e-12  # a smaller p-value means no more
+_TIES = "ties"
 _HEADINGS = ("metric", "shift", "in sigma of A", "adjusted p", "spread B/A", "adjusted p", "used A, B")
 
 
@@ -69,6 +70,8 @@ def _metric_table(comparison: Comparison) -> Iterator[str]:
     for row in rows if len(rows) > 1 else []:
         cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
         yield "  ".join(cells).rstrip()
+    if any(_TIES in row for row in rows):
+        yield f"{_TIES}: so many cases have equal values that the size of a significant change is hidden; see --report"
     if same:
         yield f"the same in both runs: {', '.join(same)}"
     absent = [metric.metric for metric in comparison.metrics if not metric.same and not finite(metric.shift)]
@@ -78,12 +81,13 @@ def _metric_table(comparison: Comparison) -> Iterator[str]:
 
 def _metric_cells(change: MetricChange, comparison: Comparison) -> tuple[str, ...]:
     unit = comparison.units[change.metric]
+    tied = hidden_by_ties(change.shift_in_sigma, 0.0, change in comparison.shifted)
     return (
         f"{change.metric}{f' [{unit}]' if unit else ''}",
-        f"{change.shift.value:.4g}",  # of a change that is in the table, which is a number
-        _with_interval(change.shift_in_sigma),
+        _TIES if tied else f"{change.shift.value:.4g}",  # of a change that is in the table, which is a number
+        _TIES if tied else _with_interval(change.shift_in_sigma),
         _p_value_text(change.shift_adjusted, comparison.alpha),
-        _with_interval(change.ratio),
+        _TIES if hidden_by_ties(change.ratio, 1.0, change in comparison.spread) else _with_interval(change.ratio),
         _p_value_text(change.spread_adjusted, comparison.alpha),
         f"{change.n_used[0]:,}, {change.n_used[1]:,}",
     )

@@ -44,6 +44,7 @@ def case_scatter(
     styles: Sequence[tuple[str, str]] = OUTCOMES,
     rings: Sequence[Points] = (),
     outlines: Sequence[Line] = (),
+    fewer: tuple[float, float] = FEWER,
     form: str = "Scatter of cases",
 ) -> Drawing:
     """The cases shown, of n_tried, and the class of each: int[n], an index into `classes`.
@@ -51,11 +52,12 @@ def case_scatter(
     cloud : all of them, with their numbers and columns.
     classes : words of each, and how many cases belong to it, those not shown among them.
     rings : around single points, as the nominal case.  lengths : whether both axes are lengths in one unit.
+    fewer : size and opacity of the points of all classes but the largest.
     """
     clouds: list[Mark] = []
     for k in sorted((k for k, (_, cases) in enumerate(classes) if cases), key=lambda k: -classes[k][1]):
         (words, cases), rows, (colour, sign) = classes[k], member == k, styles[k]
-        size, opacity = FEWER if clouds else MOST
+        size, opacity = fewer if clouds else MOST
         shown = int(rows.sum())
         thinned = "" if shown == cases else f" ({count(shown)} shown)"
         numbers = None if cloud.cases is None else cloud.cases[rows]

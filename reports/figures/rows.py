@@ -1,11 +1,13 @@
 """Figures with a row for each requirement, metric, level or input: margins, changes, levels, contributors."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from reports.drawing.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot, Points, finite, intervals, names_axis
 from reports.drawing.palette import BLUE, GREEN, INK, MUTED, ORANGE, PAPER, SKY, VERMILION
+from reports.drawing.ticks import MOST_TICKS
 from reports.text.numbers import SPACE, count, number
 
 MOST_MARGIN = 1.0  # of the reach of the limits, either way; margins beyond are drawn at the edge
@@ -13,6 +15,7 @@ TONES = {"good": GREEN, "bad": VERMILION, "open": MUTED}
 SPREAD = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)  # probabilities of what is drawn of a level
 SPANS = ((0, 6, MUTED, 1.2, "all cases"), (1, 5, SKY, 7.0, "5 % to 95 %"),
          (2, 4, BLUE, 11.0, "middle half of the cases"))  # of SPREAD, with colour, width and words  # fmt: skip
+FAR_SIGMA = 10.0  # a larger shift would squeeze those of some σ to nothing on a linear axis
 FAR_APART = 30.0  # levels whose medians differ by such a ratio are drawn on a logarithmic axis
 
 
@@ -48,38 +51,77 @@ def margin_figure(names: Sequence[str], margins: np.ndarray, tones: Sequence[str
     return Drawing("Margins relative to the limits", (plot,), 1, "; ".join(texts))
 
 
+@dataclass(frozen=True)
+class ChangeScale:
+    """An axis of changes.  unchanged : 0 of a difference, 1 of a ratio.  places : of changes on the axis."""
+
+    unchanged: float
+    axis: Axis
+    places: Callable[[np.ndarray], np.ndarray]
+
+    @property
+    def words(self) -> str:
+        return "logarithmic beyond 1 σ" if self.places is np.arcsinh else ""
+
+
+def difference_scale(estimates: np.ndarray) -> ChangeScale:
+    """For differences float64[n, 3] in σ: where some are far larger, places are sinh⁻¹, so that all are seen."""
+    if not (np.abs(finite([estimates[:, 0]])) > FAR_SIGMA).any():
+        return ChangeScale(0.0, Axis(reach=_reach(estimates)), np.asarray)
+    reach = _reach(np.arcsinh(estimates))
+    ticks = tuple((float(np.arcsinh(at)), number(at)) for at in _decades(*np.sinh(reach).tolist()))
+    return ChangeScale(0.0, Axis(reach=reach, ticks=ticks), np.arcsinh)
+
+
+def ratio_scale(estimates: np.ndarray) -> ChangeScale:
+    """For ratios float64[n, 3]: logarithmic."""
+    low, high = np.exp(_reach(np.log(estimates))).tolist()
+    return ChangeScale(1.0, Axis(reach=(low, high), log=True), np.asarray)
+
+
+def _reach(estimates: np.ndarray) -> tuple[float, float]:
+    """Ends of an axis that has every value, 0 and, unless they reach far beyond, every interval."""
+    values = finite([estimates[:, 0], 0.0])
+    room = max(float(np.ptp(values)), 0.1)
+    seen = finite([estimates, 0.0]).clip(values.min() - room, values.max() + room)
+    return float(seen.min()) - 0.05 * room, float(seen.max()) + 0.05 * room
+
+
+def _decades(low: float, high: float) -> list[float]:
+    """0 and powers of ten of both signs from 1 on between low and high, every one or, if that is many, some of them."""
+    powers = range(int(np.log10(max(-low, high))) + 1)
+    for every in range(1, len(powers) + 1):
+        tens = [10.0**power for power in powers[::every]]
+        places = [at for at in (*(-ten for ten in tens[::-1]), 0.0, *tens) if low <= at <= high]
+        if len(places) <= MOST_TICKS:
+            break
+    return places
+
+
 def change_panel(
-    title: str, metrics: Sequence[str], estimates: np.ndarray, significant: np.ndarray, unchanged: float, interval: str
-) -> Plot:
+    title: str, metrics: Sequence[str], estimates: np.ndarray, significant: np.ndarray, scale: ChangeScale,
+    interval: str,
+) -> Plot:  # fmt: skip
     """One kind of change from a run to another, of each metric.
 
     estimates : float64[n, 3], value and ends of its interval, NaN where not defined.  significant : bool[n].
-    unchanged : 0 of a difference; 1 of a ratio, whose axis is logarithmic.
     """
-    value, lower, upper = estimates.T
-    marks: list[Mark] = [Limit(unchanged, "x", INK, "no change", "dash", 1.0, key="no change")]
+    at, low, high = scale.places(estimates).T
+    marks: list[Mark] = [Limit(scale.unchanged, "x", INK, "no change", "dash", 1.0, key="no change")]
     for sure, colour, sign, key in (
         (False, BLUE, "circle", "not significant"),
         (True, VERMILION, "diamond", f"significant, with its {interval} interval"),
     ):
-        rows = np.flatnonzero(np.isfinite(value) & (significant == sure)).tolist()
-        texts = [f"{metrics[k]}: {number(value[k], 3)}, {number(lower[k], 3)} to {number(upper[k], 3)}" for k in rows]
-        marks.append(intervals(lower[rows], upper[rows], np.array(rows), colour))
-        marks.append(Points(value[rows], np.array(rows), colour, key, sign, 8.0, texts=texts, key=key))
+        rows = np.flatnonzero(np.isfinite(at) & (significant == sure)).tolist()
+        told = [[number(end, 3) for end in estimates[k].tolist()] for k in rows]
+        texts = [
+            f"{metrics[k]}: {value}, {lower} to {upper}" for k, (value, lower, upper) in zip(rows, told, strict=True)
+        ]
+        marks.append(intervals(low[rows], high[rows], np.array(rows), colour))
+        marks.append(Points(at[rows], np.array(rows), colour, key, sign, 8.0, texts=texts, key=key))
     up = names_axis(metrics, down=True)
-    return Plot(tuple(marks), change_axis(estimates, unchanged), up, title, 70.0 + 24.0 * len(metrics))
-
-
-def change_axis(estimates: np.ndarray, unchanged: float) -> Axis:
-    """Reaches every value and, unless they reach far beyond, every interval."""
-    log = bool(unchanged)
-    changes = np.log(estimates / unchanged) if log else estimates
-    values = finite([changes[:, 0], 0.0])
-    room = max(float(np.ptp(values)), 0.1)
-    seen = finite([changes, 0.0]).clip(values.min() - room, values.max() + room)
-    ends = np.array([seen.min() - 0.05 * room, seen.max() + 0.05 * room])
-    low, high = (unchanged * np.exp(ends) if log else ends).tolist()
-    return Axis(reach=(low, high), log=log)
+    title = "\n".join(filter(None, (title, scale.words)))
+    return Plot(tuple(marks), scale.axis, up, title, 70.0 + 24.0 * len(metrics))
 
 
 def level_panel(label: str, levels: Sequence[str], quantiles: np.ndarray, used: Sequence[int]) -> Plot:

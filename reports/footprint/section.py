@@ -251,7 +251,7 @@ def _distance_table(flown: Flown, landing: Landing) -> Table | None:
     if landing.rows.size < 2:
         return None
     places = [landing.centre, *([landing.aim] if landing.aim is not None and landing.aim != landing.centre else [])]
-    titles = ("50 %", *(percent(p) for p in DISTANCES[1:]))
+    titles = [percent(p) for p in _distances(flown)]
     columns = (
         Column("Distance from", "text"),
         Column("Used / tried", "number"),
@@ -265,13 +265,20 @@ def _distance_table(flown: Flown, landing: Landing) -> Table | None:
         f"50 % of the cases end within the first distance; from the {landing.centre.name} it is the circular error "
         f"probable (CEP). In brackets: distribution-free limits, each holding with {each}."
         if flown.random
-        else "Percentiles of the flown cases, not of a population."
+        else "Percentiles of the flown cases, not of a population." * bool(titles)
     )
     return Table("Distances along the ground", columns, rows, note)
 
 
+def _distances(flown: Flown) -> tuple[float, ...]:
+    """The percentiles of distances that are told: none of cases that were chosen."""
+    return () if flown.chosen else DISTANCES
+
+
 def _distance_row(flown: Flown, landing: Landing, place: Mark) -> tuple[Cell, ...]:
-    summary = summarize(landing.distances(flown, place), probabilities=DISTANCES, confidence=flown.stated.two_sided)
+    summary = summarize(
+        landing.distances(flown, place), probabilities=_distances(flown), confidence=flown.stated.two_sided
+    )
     spread = summary.spread
     cells = [
         Cell(

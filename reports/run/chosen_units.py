@@ -113,7 +113,8 @@ class ShownRun(Flown):
         sizes = [*self._own.limits(name), self._own.nominal_value(name)]
         tables = [self._own.histories]
         if name in self._own.summaries:
-            sizes += [quantile.value for quantile in self._own.summaries[name].quantiles]
+            summary = self._own.summaries[name]
+            sizes += [quantile.value for quantile in summary.quantiles] or [summary.minimum, summary.maximum]
         else:
             tables.append(self._own.cases)
         for table in tables:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from mc_engine.model.figures import KINDS, MapFigure, ScatterFigure, from_record
-from mc_engine.statistics import SAMPLING_DESIGNS, Summary, Verdict, summarize, was_looked_at
+from mc_engine.statistics import CHOSEN_DESIGNS, SAMPLING_DESIGNS, Summary, Verdict, summarize, was_looked_at
 from mc_engine.statistics.first_order import Contributor, contributors
 from mc_engine.statistics.worst import Limits, limits_on
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
@@ -75,7 +75,7 @@ class Flown:
         self.run = run
         self.name = name
         self.manifest = run.manifest
-        self.every = all_cases(run, self.stated.two_sided, self.stated.percentiles)
+        self.every = all_cases(run, self.stated.two_sided, () if self.chosen else self.stated.percentiles)
         self.cases = self.every.table
         self.nominal = run.nominal()
         self.histories = without_attributes(run.histories())
@@ -106,6 +106,11 @@ class Flown:
     def random(self) -> bool:
         """Whether shares of cases estimate probabilities."""
         return self.design in SAMPLING_DESIGNS
+
+    @property
+    def chosen(self) -> bool:
+        """Whether every case was chosen by levels: then there are no percentiles."""
+        return self.design in CHOSEN_DESIGNS
 
     @cached_property
     def columns(self) -> dict[str, ColumnFacts]:

@@ -53,11 +53,20 @@ def varying_inputs(flown: Flown) -> list[ColumnFacts]:
 
 def input_words(flown: Flown, row: int) -> str:
     """What sets a case apart, for the key of a figure: its first two inputs that vary."""
-    parts = []
-    for fact in varying_inputs(flown)[:2]:
-        value = with_unit(_input_cells(flown.cases[fact.name])[row].text, fact.unit)
-        parts.append(f"{flown.words(fact.name)} {value}")
-    return ", ".join(parts)
+    return _inputs_in_words(flown, row, varying_inputs(flown)[:2])
+
+
+def not_nominal(flown: Flown, row: int) -> str:
+    """The first inputs of a case that differ from their nominal values."""
+    inputs = [
+        fact for fact in varying_inputs(flown) if flown.cases[fact.name].iloc[row] != flown.nominal.get(fact.name)
+    ]
+    return _inputs_in_words(flown, row, inputs[:INPUTS_SHOWN]) or "nominal inputs"
+
+
+def _inputs_in_words(flown: Flown, row: int, inputs: list[ColumnFacts]) -> str:
+    values = [with_unit(_input_cells(flown.cases[fact.name])[row].text, fact.unit) for fact in inputs]
+    return ", ".join(f"{flown.words(fact.name)} {value}" for fact, value in zip(inputs, values, strict=True))
 
 
 def worst_tables(flown: Flown) -> Iterator[Table]:

@@ -47,8 +47,12 @@ def _because(verdict: Verdict) -> str:
         return f"{lost}; {verdict.failing_words}"
     if verdict.outcome == "fail":
         return f"{lost}; the true probability is at most {percent(verdict.upper)}"
-    needed = f", {count(verdict.needed)} cases without a further failure would demonstrate it" if verdict.needed else ""
-    return f"{lost}; the true probability is at least {percent(verdict.lower)}{needed}"
+    alone = not verdict.metric and verdict.outcome != "pass" and verdict.lower >= verdict.share
+    but = ", but not every requirement is demonstrated by itself" if alone else ""
+    further = (
+        f"; {count(verdict.needed)} cases without a further failure would demonstrate it" if verdict.needed else ""
+    )
+    return f"{lost}; the true probability is at least {percent(verdict.lower)}{but}{further}"
 
 
 def cost_cards(flown: Flown) -> tuple[Card, ...]:
@@ -72,7 +76,7 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
         spread, limits = summary.spread, flown.limits(name)
         median, nominal = summary.at(0.5), flown.nominal_value(name)
         rest = [f"nominal {number(nominal, 4, spread)}"] if nominal is not None else []
-        rest.append(f"median {number(median.value, 4, spread) if median else '–'}")
+        rest += [f"median {number(median.value, 4, spread)}"] if median else []
         demonstrated = _demonstrated(flown, name, limits)
         if limits == Limits() or limits.two_sided:
             low, high = (number(end, 4, spread) for end in (summary.minimum, summary.maximum))
@@ -86,7 +90,7 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
         rest.append(f"{'largest' if large else 'smallest'} {number(end, 4, spread)}")
         rest += [f"{percentile(probability)} {number(tail.value, 4, spread)}"] if tail and flown.random else []
         bound = demonstrated or f"{with_unit(number(end, 4, spread), unit)} in the cases flown"
-        answer = f"at {'most' if large else 'least'} {bound}"
+        answer = f"at {'most' if large else 'least'} {bound}{_against(limits, unit)}"
         yield Card(flown.words(name), answer, f"{'; '.join([*rest, f'from {used}'])}.")
 
 
@@ -113,9 +117,10 @@ def _tails(flown: Flown, summary: Summary) -> Iterator[str]:
 
 
 def _against(limits: Limits, unit: str) -> str:
-    """The two limits behind a range: limits ±5 s, or limits 24 to 55 m."""
+    """The limits behind a result: limits ±5 s, limits 24 to 55 m, or limit 2.5 kg; nothing without one."""
     if limits.at_most is None or limits.at_least is None:
-        return ""
+        single = [end for end in limits if end is not None]
+        return f", limit {with_unit(limit_number(single[0]), unit)}" if single else ""
     if limits.at_least == -limits.at_most:
         return f", limits ±{with_unit(limit_number(limits.at_most), unit)}"
     return f", limits {limit_number(limits.at_least)} to {with_unit(limit_number(limits.at_most), unit)}"
@@ -161,8 +166,9 @@ def warnings(flown: Flown) -> tuple[str, ...]:
         )
     if not flown.random:
         sentences.append(
-            f"The design is “{flown.design}”: its cases are chosen, not drawn at random. Fractions and percentiles "
-            "below describe these cases and do not estimate probabilities."
+            f"The design is “{flown.design}”: its cases are chosen, not drawn at random. "
+            f"Fractions {'' if flown.chosen else 'and percentiles '}below describe these cases and do not estimate "
+            "probabilities."
         )
     return tuple(sentences)
 

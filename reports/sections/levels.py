@@ -92,14 +92,15 @@ def _level_table(
     columns = (
         Column(flown.words(name), "text"),
         Column("Used / tried", "number"),
+        *((Column("Smallest", "number"),) if flown.chosen else ()),
         Column("Median", "number"),
-        Column(percent(flown.stated.probability, 3), "number"),
+        *(() if flown.chosen else (Column(percent(flown.stated.probability, 3), "number"),)),
         Column("Largest", "number"),
         Column(f"Median difference to {levels[0]}", "number"),
         Column(f"Smaller than {levels[0]}", "number"),
     )
     values = flown.values(metric)
-    body, probabilities = [], (0.5, flown.stated.probability)
+    body, probabilities = [], (0.5,) if flown.chosen else (0.5, flown.stated.probability)
     for place, (level, group) in enumerate(zip(levels, rows, strict=True)):
         summary = summarize(values[group], probabilities=probabilities, confidence=flown.stated.two_sided)
         cells = [
@@ -109,7 +110,9 @@ def _level_table(
                 _bounds(flown, item.lower, item.upper, summary.spread),
             )
             for item in summary.quantiles
-        ] or [Cell("–"), Cell("–")]
+        ] or [Cell("–") for _ in probabilities]
+        if flown.chosen:
+            cells.insert(0, Cell(number(summary.minimum, 4, summary.spread), summary.minimum))
         used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
         largest = Cell(number(summary.maximum, 4, summary.spread), summary.maximum)
         against = _difference_cells(flown, values, matched, place)

@@ -35,6 +35,7 @@ from mc_engine.studies.published import CLOSE, IMPROVED, NOT_REACHED, REACHED, U
 from reports.document.blocks import Cell, Column, Table, Text
 from reports.run.flown import Flown
 from reports.text.numbers import count, counted, exact, number, with_unit
+from reports.text.source_places import of_source
 
 TONES = {REACHED: "good", CLOSE: "good", IMPROVED: "good", NOT_REACHED: "open", UNKNOWN: ""}
 
@@ -74,7 +75,7 @@ def _value_row(record: Mapping[str, Any], where: str, verdict: str) -> tuple[Cel
     remark = record.get("reason", "") if verdict in WITH_REASON else record.get("note", "")
     status = str(record.get("status", ""))
     return (
-        Cell(str(record.get("quantity", "")), small=str(record.get("source", ""))),
+        Cell(str(record.get("quantity", "")), small=of_source(str(record.get("source", "")))),
         Cell(_text(published, unit, exact), _as_number(published), small="" if status == "legible" else status),
         Cell(_text(ours, unit, lambda value: number(value, 8)), _as_number(ours), small=where),
         _difference_cell(ours, published, unit),

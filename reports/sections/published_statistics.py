@@ -8,6 +8,7 @@ from reports.document.blocks import Cell, Column, Table
 from reports.run.flown import Flown
 from reports.sections.published import STATISTICS, TONES, own_statistic
 from reports.text.numbers import axis_label, count, number
+from reports.text.source_places import of_source
 
 Record = Mapping[str, Any]
 _TITLES = {"mean": "Mean", "standard deviation": "Standard deviation", "farthest": "Farthest from the mean"}
@@ -45,7 +46,7 @@ def _source_table(
         f"Computed: {count(flown.every.completed)} cases of this run, with its own dispersions; for the farthest as "
         "many as the source has. Marked with the outcome."
     )
-    return Table(f"{place} compared with this run", tuple(columns), tuple(body), note)
+    return Table(f"{of_source(place)} compared with this run", tuple(columns), tuple(body), note)
 
 
 def _published_and_computed(record: Record, records: Sequence[Record]) -> list[Cell]:

@@ -11,6 +11,7 @@ from reports.figures.rows import margin_figure
 from reports.run.flown import Flown
 from reports.sections.tables import TONES, limit_text
 from reports.text.numbers import SPACE, beside_limit, count, number, percent, with_unit
+from reports.text.source_places import of_source
 
 
 def requirement_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str | None]:
@@ -98,7 +99,7 @@ def _requirement_row(flown: Flown, verdict: Verdict, source: str) -> tuple[Cell,
     bounds = f"[{percent(verdict.lower)}, {percent(verdict.upper)}]" if verdict.lower is not None else ""
     needed = f"needs {count(verdict.needed)} cases" if verdict.needed else ""
     asked = f"for {percent(verdict.share, 3)} with {percent(verdict.confidence)} confidence"
-    what = "; ".join(filter(None, (flown.words(verdict.metric), source)))
+    what = "; ".join(filter(None, (flown.words(verdict.metric), of_source(source))))
     return (
         Cell(verdict.name, small=what),
         Cell(limit_text(verdict, unit) if verdict.metric else "all limits", small=asked),
@@ -165,7 +166,7 @@ def risk_table(flown: Flown) -> Table | None:
 def _risk_row(verdict: Verdict, among: int) -> tuple[Cell, ...]:
     outside = verdict.tried - verdict.passed
     allowed = (
-        Cell("none suffices", -1.0) if verdict.accepted is None else Cell(count(verdict.accepted), verdict.accepted)
+        Cell("too few cases", -1.0) if verdict.accepted is None else Cell(count(verdict.accepted), verdict.accepted)
     )
     if verdict.looked:
         consumer = Cell(f"below {percent(1.0 - verdict.confidence)}", 1.0 - verdict.confidence)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from mc_engine.statistics import Summary
 from mc_engine.units import UNITS, convert
 from reports.document.blocks import Cell, Column, Table
 from reports.run.chosen_units import spread_text
@@ -72,7 +73,7 @@ def timeline_table(flown: Flown) -> Table | None:
     rows = [_phase_row(flown, place, *begin) for place, begin in enumerate(phases)]
     for name in sorted(times, key=lambda event: _seconds(flown, event)):
         summary, event = flown.summaries[name], times[name]
-        spread = "–" if summary.sd is None else spread_text(flown, name, summary.spread or 0.0)
+        spread = _range_text(flown, name, summary) if flown.chosen else _sigma_text(flown, name, summary)
         rows.append(
             (
                 Cell(event[:1].upper() + event[1:], small=flown.columns[name].description),
@@ -88,11 +89,20 @@ def timeline_table(flown: Flown) -> Table | None:
     columns = (
         Column("Event", "text"),
         Column("Nominal time", "number"),
-        Column("1σ of the cases", "number"),
+        Column("Range of the cases" if flown.chosen else "1σ of the cases", "number"),
         Column("Nominal values at the event", "text"),
     )
     note = f"At 0 s in the nominal case, and not listed: {', '.join(at_start)}." * bool(at_start)
     return Table("Timeline of the nominal case", columns, tuple(rows), note)
+
+
+def _sigma_text(flown: Flown, name: str, summary: Summary) -> str:
+    return "–" if summary.sd is None else spread_text(flown, name, summary.spread or 0.0)
+
+
+def _range_text(flown: Flown, name: str, summary: Summary) -> str:
+    low, high = (number(end, 5, summary.spread) for end in (summary.minimum, summary.maximum))
+    return with_unit(low if summary.constant else f"{low} to {high}", flown.unit(name))
 
 
 def _phase_row(flown: Flown, place: int, name: str, time: float) -> tuple[Cell, ...]:

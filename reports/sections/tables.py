@@ -1,13 +1,16 @@
 """The tables of results: verdicts, summaries, quantiles, published values, statuses, worst cases."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
+
+import numpy as np
 
 from mc_engine.statistics import Summary, Verdict
 from mc_engine.units import convert
 from reports.document.blocks import Cell, Column, Table
 from reports.run.chosen_units import chosen_unit
 from reports.run.flown import Flown
+from reports.sections.case_tables import not_nominal
 from reports.text.numbers import (
     axis_label,
     count,
@@ -20,6 +23,7 @@ from reports.text.numbers import (
     spelled,
     with_unit,
 )
+from reports.text.source_places import of_source
 
 TONES = {"pass": "good", "fail": "bad", "not demonstrable": "open"}
 REASONS_SHOWN = 20
@@ -66,6 +70,46 @@ def summary_table(flown: Flown) -> Table:
             "D’Agostino–Pearson test agree."
         )
     return Table("Statistics of the metrics", columns, tuple(rows), note)
+
+
+def range_table(flown: Flown) -> Table:
+    """Both ends of every metric over cases that were chosen, with the case and its inputs, beside its nominal value."""
+    columns = (
+        Column("Metric", "text"),
+        Column("Used / tried", "number"),
+        Column("Nominal", "number"),
+        Column("Smallest", "text"),
+        Column("Largest", "text"),
+    )
+    rows = tuple(
+        (
+            metric_cell(flown, name),
+            Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used),
+            Cell(number(flown.nominal_value(name), scale=summary.spread), flown.nominal_value(name)),
+            *(_end_cell(flown, name, summary, end) for end in (np.nanmin, np.nanmax)),
+        )
+        for name, summary in flown.summaries.items()
+        if summary.n_used
+    )
+    note = (
+        "Used / tried: cases with a number, of all cases flown. Small: the case with this value, and its inputs "
+        "that are not nominal. The cases were chosen: their mean, standard deviation and percentiles would be those of "
+        "the choice."
+    )
+    return Table("Ranges of the metrics", columns, rows, note)
+
+
+def _end_cell(flown: Flown, name: str, summary: Summary, end: Callable[[np.ndarray], float]) -> Cell:
+    """The smallest or the largest value, and where it is: not known of a table that is a sample."""
+    values = flown.values(name)
+    value = float(end(values))
+    rows = np.flatnonzero(values == value)
+    where = f"case {count(int(flown.case_ids[rows[0]]))}: {not_nominal(flown, int(rows[0]))}"
+    if summary.constant:
+        where = "all cases with a number"
+    elif rows.size > 1:
+        where = f"{count(rows.size)} cases, first {where}"
+    return Cell(number(value, scale=summary.spread), value, small="" if flown.sampled else where)
 
 
 def metric_cell(flown: Flown, name: str) -> Cell:
@@ -181,7 +225,7 @@ def dispersed_table(records: Iterable[Mapping[str, Any]], caption: str) -> Table
         (
             Cell(axis_label(record["name"], record["unit"]), small=record["description"]),
             Cell(distribution_text(record)),
-            Cell(record["source"] or "not stated"),
+            Cell(of_source(record["source"] or "not stated")),
         )
         for record in records
     )
@@ -229,7 +273,7 @@ def input_table(flown: Flown) -> Table | None:
                 Cell(exact(nominal) if nominal != "" else "–"),
                 Cell(distribution_text(record)),
                 Cell(drawn),
-                Cell(str(record.get("source") or "not stated"), small=str(record.get("note") or "")),
+                Cell(of_source(str(record.get("source") or "not stated")), small=str(record.get("note") or "")),
             )
         )
     return Table("Dispersed inputs", columns, tuple(rows)) if rows else None

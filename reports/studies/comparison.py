@@ -1,5 +1,6 @@
 """What `mc-engine compare A B --report FILE` writes: the comparison of two runs as a page or as a PDF."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import astuple
 from pathlib import Path, PurePosixPath
@@ -7,7 +8,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from mc_engine.durable_file import write_durably
-from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, finite
+from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, finite, hidden_by_ties
 from mc_engine.studies.comparison import Comparison, VerdictChange
 from mc_engine.studies.run_changes import Difference
 from mc_engine.units import convert
@@ -34,7 +35,6 @@ from reports.text.numbers import SPACE, axis_label, count, fixed, number, percen
 
 LEAST_P = 1e-12  # a smaller p-value means no more
 ROUNDING = 1e-12  # of a mean: a smaller standard deviation is none
-OF_TIES = 1e-6  # a size and its interval no farther from no change: that of a test whose statistic jumps there
 GLOSSARY = Terms(
     (
         (
@@ -134,7 +134,7 @@ def _change_sentence(comparison: Comparison) -> str:
 
 
 def _run_facts(comparison: Comparison) -> tuple[tuple[str, str], ...]:
-    reason = comparison.pairing.reason
+    reason = re.sub(r"(?<=\d),(?=\d{3})", SPACE, comparison.pairing.reason)
     facts = []
     for letter, name, cases, ok, created in zip(
         "AB", _short_names(comparison.names), comparison.cases, comparison.ok, comparison.created, strict=True
@@ -278,8 +278,7 @@ def _number_cell(value: float, scale: float) -> Cell:
 
 def _size_cell(estimate: Estimate, none: float, significant: bool) -> Cell:
     """The size of a change; of one that is significant, but whose interval is no change alone, that ties hide it."""
-    ends = np.array(astuple(estimate))
-    if significant and finite(estimate) and (np.abs(ends - none) <= OF_TIES).all():
+    if hidden_by_ties(estimate, none, significant):
         return Cell("–", small="ties")
     return _estimate_cell(estimate)
 
@@ -356,7 +355,7 @@ def _verdict_table(comparison: Comparison) -> Table | None:
 
 
 def _tone(change: VerdictChange) -> str:
-    if change.worse:
+    if change.worse or change.after == "fail":
         return "bad"
     return "good" if change.after == "pass" else ""
 

@@ -22,11 +22,24 @@ from reports.document.blocks import (
 )
 from reports.drawing.marks import Axis, Drawing, Limit, Line, Plot, Points, intervals, nominal_ring
 from reports.drawing.palette import BLUE, INK, PURPLE, VERMILION
-from reports.figures.clouds import case_scatter
+from reports.figures.clouds import MOST, case_scatter
 from reports.sections.figure_blocks import thinned_by_outcome
 from reports.sections.provenance import origin_table
 from reports.sections.tables import dispersed_table
-from reports.text.numbers import SPACE, axis_label, count, exact, named, number, percent, same_lengths, with_unit, words
+from reports.text.numbers import (
+    SPACE,
+    axis_label,
+    count,
+    exact,
+    named,
+    number,
+    percent,
+    same_lengths,
+    spelled,
+    with_unit,
+    words,
+)
+from reports.text.source_places import of_source
 
 CLASSES = ("drawn from the dispersions, not failed", "failed")
 DESIGN_POINTS = (
@@ -95,7 +108,7 @@ def build_rare_event(record: RareEventRecord, name: str) -> Document:
             facts=_estimate_facts(record),
             verdicts=(_verdict_card(result),),
             costs=tuple(_cost_cards(result)),
-            warnings=tuple(result["remarks"]),
+            warnings=tuple(map(spelled, result["remarks"])),
             sections=sections,
         )
     )
@@ -143,26 +156,18 @@ def _estimate_facts(record: RareEventRecord) -> tuple[tuple[str, str], ...]:
 
 def _verdict_card(result: dict[str, Any]) -> Card:
     allowed = 1.0 - result["requirement"]["share"]
-    source = f" Source: {result['requirement']['source']}." if result["requirement"]["source"] else ""
+    source = f" Source: {of_source(result['requirement']['source'])}." if result["requirement"]["source"] else ""
     answer, tone = _judged(result)
-    return Card(
-        label=result["requirement"]["name"],
-        answer=answer,
-        detail=f"Probability of failure {number(result['probability'], 3)}, {_interval(result)}; allowed: "
-        f"{number(allowed, 3)}.{source}",
-        tone=tone,
-    )
+    found = f"Probability of failure {number(result['probability'], 3)}, {_interval(result)}"
+    if not result["probability"]:
+        found = f"No case failed: probability of failure below {number(result['upper'], 3)}"
+    return Card(result["requirement"]["name"], answer, f"{found}; allowed: {number(allowed, 3)}.{source}", tone)
 
 
 def _cost_cards(result: dict[str, Any]) -> Iterator[Card]:
-    error = result["relative_error"]
-    yield Card(
-        label="standard error",
-        answer="none" if error is None else percent(error, 1),
-        detail="of the probability; the interval is a fifth wider than this error gives."
-        if result["method"] != "plain"
-        else "of the probability; the interval is Clopper and Pearson’s.",
-    )
+    wider = "is a fifth wider than this error gives" if result["method"] != "plain" else "is Clopper and Pearson’s"
+    if (error := result["relative_error"]) is not None:
+        yield Card("standard error", percent(error, 1), f"of the probability; the interval {wider}.")
     plain = result["plain_cases"]
     if plain is not None and result["method"] != "plain":
         yield Card(
@@ -178,8 +183,8 @@ def _failures(record: RareEventRecord) -> Iterator[FigureBlock | Table | str | N
     yield (
         f"{count(result['failed'])} of {count(result['cases'])} cases failed"
         + (f", {count(result['no_number'])} of them without a number" if result["no_number"] else "")
-        + ". All are in cases.parquet, with the level and the weight of each; the weights of those that "
-        "failed add up to the probability."
+        + ". All cases are in cases.parquet, with the level and the weight of each"
+        + ("; the weights of those that failed add up to the probability." if result["failed"] else ".")
     )
     yield _failure_figure(record)
     yield _input_table(result) if result["inputs"] else None
@@ -214,6 +219,7 @@ def _failure_figure(record: RareEventRecord) -> FigureBlock | None:
             for key, name, colour in DESIGN_POINTS
             if shown[0].get(key) is not None
         ],
+        fewer=MOST,  # failed cases are not few here: larger, they would look like more than they are
         form="Failed cases over two inputs",
     )
     caption = (

@@ -29,6 +29,7 @@ from reports.studies.tuning_tables import (
     published_table,
 )
 from reports.text.numbers import SPACE, count
+from reports.text.source_places import of_source
 
 GLOSSARY = Terms(
     (
@@ -191,7 +192,7 @@ def _front_figure(tuned: Tuned) -> FigureBlock:
             ("feasible candidates", feasible, shown[1]),
         ],
         tuned.best[names].to_numpy(),
-        [(point["name"], [point["values"][name] for name in names]) for point in tuned.plan["published"]],
+        [(of_source(point["name"]), [point["values"][name] for name in names]) for point in tuned.plan["published"]],
         relaxed=not tuned.record.feasible,
         first_small=tuned.plan["objectives"][0]["goal"] == "minimise",
     )

@@ -12,6 +12,7 @@ from reports.sections.provenance import origin_table
 from reports.sections.tables import dispersed_table, value_table
 from reports.studies.tuned import Tuned, inside, limit_words
 from reports.text.numbers import axis_label, column_texts, count, exact, number, percent, with_unit
+from reports.text.source_places import of_source
 
 ROWS_SHOWN = 30  # of the front
 MOST_PARAMETERS = 8  # in the table of the front
@@ -97,7 +98,7 @@ def published_table(tuned: Tuned) -> Table | None:
         limits = "" if tuned.record.feasible else "outside a constraint"
         cells = [Cell(number(value, 5), float(value)) for value in (*point, *ours)]
         verdict = Cell(words_, small=limits, tone="good" if good and not limits else "open")
-        rows.append((Cell(record["name"]), *cells, verdict, Cell(record["source"])))
+        rows.append((Cell(of_source(record["name"])), *cells, verdict, Cell(of_source(record["source"]))))
     note = "Computed: the candidate of the front that falls least short of the point in its worst objective."
     return Table("Published points compared with the front", columns, tuple(rows), note)
 
@@ -119,7 +120,7 @@ def parameter_table(tuned: Tuned) -> Table:
         cells = [Cell(exact(parameter[key]), float(parameter[key])) for key in ("lower", "upper")]
         label = Cell(axis_label(name, tuned.units[name]), small=tuned.descriptions[name])
         nominal = Cell(exact(parameter["nominal"]), float(parameter["nominal"]))
-        rows.append((label, *cells, Cell(on_front), nominal, Cell(parameter["source"] or "not stated")))
+        rows.append((label, *cells, Cell(on_front), nominal, Cell(of_source(parameter["source"] or "not stated"))))
     return Table("Tuned parameters", columns, tuple(rows))
 
 
@@ -141,7 +142,7 @@ def measure_table(tuned: Tuned) -> Table:
             Cell("constraint"),
             _metric_cell(tuned, constraint),
             Cell(limit_words(tuned, constraint)),
-            Cell(constraint["source"]),
+            Cell(of_source(constraint["source"])),
         )
         for constraint in tuned.plan["constraints"]
     ]

@@ -5,7 +5,8 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from mc_engine.command_line.commands import app
-from mc_engine.units import UNITS, compatible, convert, nearest_unit, unit_hint
+from mc_engine.errors import ModelError
+from mc_engine.units import UNITS, compatible, convert, nearest_unit, unit_hint, unit_of
 
 
 @pytest.mark.parametrize(
@@ -50,6 +51,24 @@ def test_only_units_of_the_same_quantity_are_compatible():
 )  # fmt: skip
 def test_the_unit_that_was_meant_is_found(written, meant):
     assert nearest_unit(written, UNITS) == meant
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [("h_mtr", "h_m"), ("h_mtrs", "h_m"), ("h_kmm", "h_km"), ("t_secs", "t_s"), ("t_msec", "t_ms"), ("t_hrs", "t_h"),
+     ("t_minutes", "t_min"), ("p_kpas", "p_kpa"), ("n_rpms", "n_rpm"), ("angle_dge", "angle_deg"),
+     ("angle_arcsc", "angle_arcsec"), ("k_w_m2k", "k_w_m2_k")],
+)  # fmt: skip
+def test_a_misspelt_ending_is_answered_with_the_unit_that_was_meant(name, meant):
+    with pytest.raises(ModelError, match=f'did you mean "{meant}"'):
+        unit_of(name)
+
+
+@pytest.mark.parametrize("ending", ["kmh", "kph", "kts", "mach", "gm", "mbar", "m3s", "mm2", "dgr", "lbs", "psi"])
+def test_the_unit_of_another_quantity_is_no_answer_to_an_ending_like_it(ending):
+    with pytest.raises(ModelError) as caught:
+        unit_of(f"x_{ending}")
+    assert "did you mean" not in str(caught.value)
 
 
 def test_an_unknown_unit_is_answered_with_the_command_that_lists_them():

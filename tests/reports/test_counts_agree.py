@@ -18,6 +18,7 @@ from figure_marks import FORMS, classes
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.campaign.search import find_campaign, list_campaigns
 from mc_engine.runner.runner import run
+from mc_engine.statistics import CHOSEN_DESIGNS
 from reports import render_html, render_pdf
 from reports.contents import build
 from reports.document.blocks import Table, blocks_of
@@ -176,10 +177,12 @@ def test_the_data_validate_against_their_schema_and_have_the_numbers_of_the_tabl
 
 @every_campaign
 def test_the_tables_show_the_numbers_of_the_data(reported, record):
-    _, document = reported
+    store, document = reported
     tables = list(blocks_of(document, Table))
     for one in record["metrics"]:
-        numbers = [one["mean"], one["sigma"], one["minimum"], one["maximum"]]
+        chosen = store.manifest["campaign"]["design"] in CHOSEN_DESIGNS
+        numbers = [one["minimum"], one["maximum"], *([] if chosen else [one["mean"], one["sigma"]])]
+        assert bool(one["quantiles"]) == (not chosen and one["n_used"] > 0)
         numbers += [
             quantile["value"] for quantile in one["quantiles"] if quantile["probability"] in (0.00135, 0.5, 0.99865)
         ]

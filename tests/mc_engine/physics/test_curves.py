@@ -224,12 +224,30 @@ def test_what_is_wrong_with_a_call_is_said(folder):
         curve(x=[0, 1], y=[0, 1], outside="nan")
     with pytest.raises(ModelError, match="there is no file"):
         curve(x="time_s", y="thrust_n")
-    with pytest.raises(ModelError, match="so close"):
-        curve(x=[0.0, 5e-324, 1.0], y=[0.0, 1.0, 2.0])
     with pytest.raises(ModelError, match="rise"):
         surface(x=[0, 1], y=[1, 0], z=[[0, 0], [0, 0]])
     with pytest.raises(FileNotFoundError):
         curve("missing.csv")
+
+
+@pytest.mark.parametrize("kind", ["linear", "cubic"])
+def test_points_that_lie_too_close_are_refused_by_one_sentence_without_a_warning_of_numpy(kind):  # an error in tests
+    for x, sentence in [
+        ([0.0, 5e-324, 1.0], "two points lie so close"),
+        ([0.0, 1e-320, 2e-320], "all arguments lie within 2e-320"),
+    ]:
+        with pytest.raises(ModelError, match=sentence):
+            curve(x=x, y=[0.0, 1.0, 2.0], kind=kind)
+        for z in ([[0.0, 1.0], [2.0, 3.0], [4.0, 6.0]], np.transpose([[0.0, 1.0], [2.0, 3.0], [4.0, 6.0]])):
+            axes = (x, [0.0, 1.0]) if len(z) == 3 else ([0.0, 1.0], x)
+            with pytest.raises(ModelError, match=sentence):
+                surface(x=axes[0], y=axes[1], z=z, kind=kind)
+
+
+def test_a_cubic_curve_is_never_lost_at_its_own_points():
+    with pytest.raises(ModelError, match="two points lie so close"):
+        curve(x=[0.0, 1e-160, 1.0], y=[0.0, 1.0, 2.0], kind="cubic")  # whose slopes are finite, but not their changes
+    assert curve(x=[0.0, 1e-90, 1.0], y=[0.0, 1.0, 2.0], kind="cubic")(0.0) == 0.0
 
 
 def test_numbers_of_arrays_are_in_the_unit_that_is_said():

@@ -80,6 +80,13 @@ def test_a_summary_has_the_percentiles_that_the_report_states(tmp_path):
     assert found.at(0.9).value == pytest.approx(np.quantile(values.dropna(), 0.9, method="median_unbiased"), rel=0.05)
 
 
+def test_a_grid_has_ends_and_no_percentiles(tmp_path):
+    store = small_store(tmp_path / "flown")
+    store.manifest["campaign"]["design"] = "grid"
+    found = summaries(store)["propellant_kg"]
+    assert (found.quantiles, found.maximum) == ((), store.cases()["propellant_kg"].max())
+
+
 def test_a_summary_in_lines_says_how_many_cases_it_rests_on():
     lines = summary_lines("fuel_kg", summarize(np.array([1.0, np.nan, 2.0])), "kg", random=True)
     assert lines[0] == "fuel_kg [kg]: 2 of 3 cases have a number"

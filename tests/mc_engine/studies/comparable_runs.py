@@ -19,7 +19,7 @@ TEXT = '[campaign]\nmodel = "model.py"\nseed = 1\n'
 
 
 def run(
-    path, *, n=400, seed=1, shift=0.0, noise=1, limit=3.0, failed=0, text=TEXT, columns=COLUMNS, **changes
+    path, *, n=400, seed=1, shift=0.0, noise=1, limit=3.0, failed=0, text=TEXT, columns=COLUMNS, pulses=3.0, **changes
 ) -> Store:
     """A run of `n` cases.  shift : of propellant, in kg (sigma is 1.25); noise : seed of what inputs do not decide."""
     case = np.arange(n)
@@ -33,7 +33,7 @@ def run(
         "mode": np.where(case % 2 == 0, "pulsed", "off"),
         "propellant_kg": np.where(ok, ve + 0.75 * own + shift, np.nan),
         "range_m": np.where(ok, 1e6 - ve**2, np.nan),
-        "pulses": np.where(ok, 3.0, np.nan),
+        "pulses": np.where(ok, pulses, np.nan),
     }
     manifest = {
         "format": 1,

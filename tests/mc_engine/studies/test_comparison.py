@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from comparable_runs import TEXT, run
 
+from mc_engine.sampling.streams import uniforms
 from mc_engine.studies.comparison import compare_runs, pair_cases
 from mc_engine.studies.comparison_lines import comparison_lines
-from tests.mc_engine.command_line.cart import call
+from tests.mc_engine.command_line.cart import REQUIREMENT, call
 
 
 def compared(a, b, **options):
@@ -31,6 +32,7 @@ def test_counts_by_the_limits_of_one_run_and_of_each_are_told_apart(tmp_path):
     before, after = counted.removeprefix("fuel: ").split(",")[0].split(" -> ")
     assert before == after  # the same cases
     assert not verdict.startswith(f"requirement fuel: {before}")
+    assert verdict.endswith("of 400 cases inside; in B the limit is different")
 
 
 def test_a_shift_is_found_in_the_metric_that_moved_alone(tmp_path):
@@ -79,6 +81,33 @@ def test_a_requirement_that_stands_worse_on_the_same_cases_is_a_change(tmp_path)
     assert found.changed
     better = compared(run(tmp_path / "c", limit=0.5), run(tmp_path / "d", limit=3.0))
     assert not better.changed
+
+
+@pytest.mark.parametrize("requirement_of", ["A", "B"])
+def test_the_only_requirement_of_a_run_is_its_joint_verdict(tmp_path, requirement_of):
+    one, two = (REQUIREMENT | {"name": name, "metric": metric, "at_most": limit, "share": 0.9}
+                for name, metric, limit in (("fuel", "propellant_kg", 3.0), ("range", "range_m", 2e6)))  # fmt: skip
+    sets = {"A": [one, two], "B": [one, two]} | {requirement_of: [one]}
+    found = compared(*(run(tmp_path / name, requirements=records) for name, records in sets.items()))
+    joint = next(verdict for verdict in found.verdicts if verdict.name == "all at once")
+    assert joint.words == "pass in both runs"
+    (line,) = [line for line in comparison_lines(found) if line.startswith("requirement all at once")]
+    assert line.endswith(f"of 400 cases inside; in {requirement_of} fuel is the only requirement")
+    nothing = compared(run(tmp_path / "c", requirements=[one, two]), run(tmp_path / "d", requirements=[]))
+    assert {verdict.words for verdict in nothing.verdicts} == {"pass → not required"}
+
+
+def tied(path, seed, pulses):
+    """A run of other cases, of which most have no pulse and so are equal to each other."""
+    return run(path, n=1000, seed=seed, pulses=np.where(uniforms(7, "own", np.arange(1000)) < pulses, 1.0, 0.0))
+
+
+def test_a_terminal_shows_no_size_of_a_change_that_ties_hide(tmp_path):
+    lines = list(comparison_lines(compared(tied(tmp_path / "a", 1, 0.1), tied(tmp_path / "b", 2, 0.3))))
+    (row,) = [line for line in lines if line.startswith("pulses ")]
+    _, shift, in_sigma, _, star, *_ = row.split()
+    assert (shift, in_sigma, star) == ("ties", "ties", "*")
+    assert any(line.startswith("ties: ") for line in lines)
 
 
 def test_what_changed_in_code_and_campaign_is_told(tmp_path):

@@ -6,7 +6,7 @@ import pytest
 from mc_engine.statistics.drivers import SuccessCurve
 from reports.drawing.marks import Axis, Limit, Line, Plot, Points
 from reports.drawing.strokes import Frame, stroked
-from reports.figures.rows import change_panel, tornado
+from reports.figures.rows import change_panel, difference_scale, tornado
 from reports.figures.statistics import correlation_matrix, success_panel
 
 EFFECTS = np.array([[0.5, 0.4, 0.6], [0.2, 0.1, 0.3]])
@@ -30,8 +30,16 @@ def test_the_intervals_of_a_tornado_span_total_and_first_effects():
 
 def test_the_intervals_of_changes_stand_at_the_rows_of_their_metrics():
     estimates = np.array([[1.0, 0.5, 1.5], [-2.0, -3.0, -1.0], [0.1, -0.2, 0.4]])
-    plot = change_panel("means", ["a", "b", "c"], estimates, np.array([False, True, False]), 0.0, "90 %")
-    assert sorted(pieces(plot)) == [[-3.0, 1.0, -1.0, 1.0], [-0.2, 2.0, 0.4, 2.0], [0.5, 0.0, 1.5, 0.0]]
+    for far, place in ((1.0, float), (1e4, np.arcsinh)):  # 10 000 σ make the axis logarithmic
+        ends = far * estimates
+        plot = change_panel(
+            "means", ["a", "b", "c"], ends, np.array([False, True, False]), difference_scale(ends), "90 %"
+        )
+        expected = [
+            [place(far * low), row, place(far * high), row]
+            for low, row, high in ((-3, 1, -1), (-0.2, 2, 0.4), (0.5, 0, 1.5))
+        ]
+        np.testing.assert_allclose(sorted(pieces(plot)), expected)
 
 
 def test_the_intervals_of_a_success_probability_and_the_extents_of_its_bins():

@@ -52,6 +52,14 @@ def slow():
     return run
 
 
+def test_a_grid_is_told_in_the_units_of_its_values_though_it_has_no_percentiles():
+    run = synthetic_run(400, failed=0)
+    run.manifest["requirements"], run.nominal_row["settling_time_s"] = [], 1e-9
+    for design in ("mc", "grid"):
+        run.manifest["campaign"]["design"] = design
+        assert ShownRun(Flown(run, "run")).unit("settling_time_s") == "s"
+
+
 def test_a_metric_has_one_unit_on_all_pages_and_on_the_axes(slow):
     document = build(slow, "run")
     text = render_markdown(document).decode().replace("\\", "")

@@ -60,6 +60,8 @@ def test_chosen_cases_have_ranges_in_place_of_intervals():
     run.manifest["campaign"]["design"] = "grid"
     _, tables = choices(build(run, "run"))
     table = tables["Peak load [g] by law"]
+    assert [column.title for column in table.columns[2:5]] == ["Smallest", "Median", "Largest"]
+    assert table.rows[1][2].value == run.table[run.table["law"] == table.rows[1][0].text]["peak_load_g"].min()
     assert table.rows[1][5].small == "0.5 to 0.5"
     assert "there is no interval" in table.note
 

@@ -46,7 +46,7 @@ def test_the_table_has_a_row_a_quantity_and_says_what_is_reached(fuel):
     good = record("mean", mean * 1.1, tolerance=mean)
     bad = record("standard deviation", 1e6, tolerance=1.0, status="restored")
     (table,) = statistics_tables(flown(good, bad))
-    assert table.caption == "Table 12 compared with this run"
+    assert table.caption == "Table 12 of the source compared with this run"
     (row,) = table.rows
     assert row[0].text == "propellant_kg [kg]"
     assert [row[2].tone, row[4].tone] == ["good", "open"]

@@ -124,6 +124,23 @@ def test_both_tables_stand_in_the_section_of_requirements():
     assert captions == ["Verification matrix", "Margins of the requirements", "Risks of the verdicts"]
 
 
+def test_a_joint_verdict_that_waits_for_a_requirement_alone_says_so():
+    strict, loose = ({**FUEL, "name": str(share), "at_most": 1e3, "share": share} for share in (0.9973, 0.9))
+    built = flown(400, campaign=mc(400), requirements=[strict, loose])
+    *_, joint = verdict_cards(built)
+    assert built.joint.lower > built.joint.share
+    assert joint.answer == "not demonstrable"
+    assert "but not every requirement is demonstrated by itself; 852 cases without a further failure" in joint.detail
+    assert risk_table(built).rows[0][2].text == "too few cases"
+
+
+def test_a_key_result_stands_beside_its_limit():
+    for limit, words in (({}, ", limit 2.5"), ({"at_least": -1.0}, ", limits −1 to 2.5")):
+        built = flown(2000, campaign=mc(2000), requirements=[{**FUEL, **limit}])
+        card = next(card for card in cost_cards(built) if card.label == "propellant")
+        assert card.answer.endswith(f"{words}\u202fkg")
+
+
 def test_the_joint_card_names_the_requirement_that_fails_it():
     draw = Flown(synthetic_run(3000, 0, campaign=mc(3000)), "run")
     at_most = float(np.sort(draw.values("propellant_kg"))[-27])  # 26 of 3000 are outside

@@ -12,6 +12,7 @@ from synthetic_run import synthetic_run
 from mc_engine.errors import StoreError
 from mc_engine.studies.comparison import compare_runs
 from reports.document.blocks import FigureBlock, Table, blocks_of
+from reports.drawing.marks import Points
 from reports.drawing.ticks import axis_ticks
 from reports.formats.html import render_html
 from reports.studies.comparison import build_comparison, write_comparison
@@ -79,19 +80,33 @@ def test_requirements_come_first_and_in_words():
     passed = [int((run.table["peak_force_n"] <= limit).sum()) for run, limit in ((a, 20.0), (b, 1e3))]
     card = document.verdicts[0]
     assert (card.label, card.answer, card.tone) == ("force", "fail → pass", "good")
-    assert card.detail == f"{passed[0]:,} → {passed[1]:,} of {len(a.table):,} cases inside".replace(",", "\u202f")
+    counts = f"{passed[0]:,} → {passed[1]:,} of {len(a.table):,}".replace(",", "\u202f")
+    assert card.detail == f"{counts} cases inside; in B the limit is different"
     assert "force: fail → pass" in document.subtitle
+    assert dict(document.facts)["Cases"] == "Paired: 1\u202f200 cases have the same inputs in both runs"
+    tones = {row[0].text: (row[2].text, row[2].tone) for row in next(iter(tables(document).values())).rows}
+    assert tones["force"] == ("pass", "good")
+    assert tones["all at once"] == ("fail", "bad")  # as before; it is no less a failure for that
 
 
-def test_a_shift_far_beyond_the_others_is_said_and_the_axis_shows_the_others():
+def test_shifts_of_thousands_of_sigma_and_of_a_few_are_both_seen_in_the_figure():
     a, b = two_runs(1.0)
+    b.table["peak_force_n"] += 5000.0 * a.table["peak_force_n"].std()
     document = build_comparison(compare_runs(a, b, ("before", "after")))
     (figure,) = blocks_of(document, FigureBlock)
-    low, high = figure.drawing.plots[0].x.reach
-    assert -10.0 < low < high < 10.0
-    assert "beyond the axis, not drawn: entry speed" in figure.caption
+    plot = figure.drawing.plots[0]
+    assert plot.title.splitlines() == ["Shift [σ of run A]", "logarithmic beyond 1 σ"]
+    marks = [mark for mark in plot.marks if isinstance(mark, Points)]
+    places = sorted(abs(place) / plot.x.reach[1] for mark in marks for place in mark.x)
+    assert len(places) == 3
+    assert places[0] > 0.03  # a third of a σ
+    assert places[-1] < 1.0
+    ticks = {text: place for place, text in plot.x.ticks}
+    assert 0.0 == ticks["0"] < ticks["1"] < ticks["10"] < ticks["1000"] < plot.x.reach[1]
+    assert "peak force: 5000" in figure.drawing.alternative
     rows = tables(document)["Metrics of both runs"].rows
-    assert [row[0].text.split(" [")[0].split("\u202f")[0] for row in rows] == ["entry speed", "settling time"]
+    names = [row[0].text.split(" [")[0].split("\u202f")[0] for row in rows]
+    assert names == ["peak force", "entry speed", "settling time"]
 
 
 def test_many_changes_are_drawn_in_panels_that_find_room_on_a_page_that_is_begun():

@@ -100,11 +100,16 @@ def test_without_a_failed_case_the_report_says_below(tmp_path):
         relative_error=None,
         plain_cases=None,
         levels=[level(None, 1.0)],
-        remarks=["Nothing varies."],
+        remarks=["The probability is smaller than 1.2e-14."],
     )
     document = build_rare_event(record, "out")
     assert document.subtitle == "No case failed: P(fuel > 2.5\u202fkg) < 0.0003. Requirement met."
-    assert document.warnings == ("Nothing varies.",)
+    assert document.warnings == ("The probability is smaller than 1.2·10⁻¹⁴.",)
+    assert document.verdicts[0].detail.startswith(
+        "No case failed: probability of failure below 0.0003; allowed: 0.0027."
+    )
+    assert document.costs == ()  # there is no standard error of nothing
+    assert "add up" not in repr(document.sections[0])
     assert not list(blocks_of(document, FigureBlock))
 
 
@@ -130,6 +135,8 @@ def test_failed_cases_are_a_scatter_of_the_two_inputs_they_lie_farthest_in(tmp_p
     ordinary, failed, likeliest = figure.drawing.plots[0].marks
     np.testing.assert_array_equal(failed.x, cases["b"][700:])
     np.testing.assert_array_equal(failed.y, cases["c"][700:])
+    assert (failed.size, failed.opacity) == (ordinary.size, ordinary.opacity)
+    assert (failed.colour, failed.sign) != (ordinary.colour, ordinary.sign)
     assert (ordinary.x.size, likeliest.x[0], likeliest.y[0]) == (500, -5.0, 3.0)
     assert classes(figure.drawing) == {"drawn from the dispersions, not failed": 500, "failed": 300}
 

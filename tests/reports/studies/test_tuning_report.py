@@ -53,7 +53,7 @@ def test_the_front_is_drawn_with_every_candidate_and_the_published_points(record
     np.testing.assert_array_equal(np.column_stack([front.x, front.y]), record.front[["cost", "error"]])
     keys = [mark.key for mark in drawing.key]
     assert sum(int(text.split()[0]) for text in keys if "candidates" in text and text[0].isdigit()) == 300
-    assert {"Table 8", "Table 9"} <= set(keys)
+    assert {"Table 8 of the source", "Table 9 of the source"} <= set(keys)
     assert any("front: " in mark.key for mark in drawing.key)
     low, high = drawing.plots[0].x.reach
     assert low < -0.9 < 0.9 < high
@@ -62,9 +62,15 @@ def test_the_front_is_drawn_with_every_candidate_and_the_published_points(record
 def test_a_published_point_is_beaten_or_not(document):
     rows = table(document, "Published points").rows
     said = {row[0].text: row[-2] for row in rows}
-    assert said["Table 8"].text == "no worse in any objective"
-    assert said["Table 8"].tone == "good"
-    assert said["Table 9"].text.endswith("worse in one")
+    assert said["Table 8 of the source"].text == "no worse in any objective"
+    assert said["Table 8 of the source"].tone == "good"
+    assert said["Table 9 of the source"].text.endswith("worse in one")
+
+
+def test_no_table_of_the_source_reads_like_a_table_of_the_report(document):
+    constraint = table(document, "Objectives and constraints").rows[-1]
+    parameter = table(document, "Tuned parameters").rows[0]
+    assert (constraint[-1].text, parameter[-1].text) == ("Table 5 of the source", "Table 2 of the source")
 
 
 def test_the_table_of_the_front_is_the_front(record, document):
