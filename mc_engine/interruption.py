@@ -6,7 +6,7 @@ names the command that continues.  This module imports very little, so that the 
 before it loads the rest.
 
 Python runs signal handlers in its main thread, between two bytecodes.  A kernel or the compiler would delay them, so
-the main thread of the command line runs both by `in_another_thread`, and waits.
+the main thread of a command leaves both to other threads, a worker pool or `in_threads`, and waits.
 """
 
 import atexit
@@ -15,6 +15,7 @@ import signal
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -60,7 +61,7 @@ class _CommandLine:
 
     installed : the handlers are those of the command line, in process `process`.  signals : how many came since then.
     last_s : time of the last one.  under_way : a command is running, which an exception may unwind.
-    done : the command has ended.  abandoned : a kernel or the compiler still runs, and nobody waits for it.
+    done : the command has ended.  abandoned : a kernel or the compiler may still run, and nobody waits for it.
     """
 
     installed: bool = False
@@ -135,54 +136,42 @@ def ignore_signals() -> None:
 def _at_exit() -> None:
     """Let no late signal change the exit status of a command that is complete."""
     ignore_signals()
-    if _COMMAND_LINE.abandoned:  # a kernel that still runs needs the interpreter: end without taking it down
+    if _COMMAND_LINE.abandoned:  # a kernel that may still run needs the interpreter: end without taking it down
         for stream in (sys.stdout, sys.stderr):
             with suppress(OSError, ValueError):
                 stream.flush()
         _leave(INTERRUPTED)
 
 
-def in_another_thread(work: Callable[[], T]) -> T:
-    """Return what `work` returns, or raise what it raises.
-
-    In the main thread of the command line, `work` runs in another thread: a signal is then handled at once, and the
-    work is abandoned.
-    """
-    if not _COMMAND_LINE.installed or threading.current_thread() is not threading.main_thread():
-        return work()
-    from concurrent.futures import Future, wait
-
-    outcome: Future[T] = Future()
-    threading.Thread(target=_settle, args=(work, outcome), daemon=True).start()
-    try:
-        while not wait([outcome], _LOOK_EVERY_S).done:  # Windows handles no signal during a wait without limit
-            pass
-    except BaseException:
-        _COMMAND_LINE.abandoned = True
-        raise
-    return outcome.result()
-
-
-def in_threads(work: Callable[[S], T], items: Sequence[S], workers: int) -> list[T]:
+def in_threads(work: Callable[[S], T], items: Sequence[S], workers: int = 1) -> list[T]:
     """What `work` returns for each of the items, by up to `workers` daemon threads, which delay no end of the process.
 
     Raises the first that `work` raises; items not begun by then are left.  A signal is handled at once.
     """
-    if not items:
-        return []
     from concurrent.futures import FIRST_EXCEPTION, Future, wait
-    from multiprocessing.pool import ThreadPool
 
     outcomes: list[Future[T]] = [Future() for _ in items]
-    tasks = [(partial(work, item), outcome) for item, outcome in zip(items, outcomes, strict=True)]
-    with ThreadPool(min(workers, len(items))) as pool:
-        pool.starmap_async(_settle, tasks, chunksize=1)
+    queue = deque((partial(work, item), outcome) for item, outcome in zip(items, outcomes, strict=True))
+
+    def work_off() -> None:
+        with suppress(IndexError):  # of the empty queue; an error of `work` is in its outcome
+            while True:
+                _settle(*queue.popleft())
+
+    try:
+        for _ in range(min(workers, len(items))):
+            threading.Thread(target=work_off, daemon=True).start()
         while True:
             done, waiting = wait(outcomes, _LOOK_EVERY_S, FIRST_EXCEPTION)  # Windows handles no signal in one long wait
             if failed := [outcome for outcome in done if outcome.exception() is not None]:
                 failed[0].result()
             if not waiting:
                 return [outcome.result() for outcome in outcomes]
+    except KeyboardInterrupt:
+        _COMMAND_LINE.abandoned = True
+        raise
+    finally:
+        queue.clear()
 
 
 def _settle(work: Callable[[], T], outcome: "Future[T]") -> None:
@@ -238,6 +227,7 @@ def stop_signal() -> Iterator[threading.Event]:
         if not _COMMAND_LINE.count():
             return
         if stop.is_set():
+            _COMMAND_LINE.abandoned = True
             raise Interrupted
         stop.set()
         if _COMMAND_LINE.installed:

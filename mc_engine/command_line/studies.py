@@ -28,7 +28,7 @@ from mc_engine.command_line.app import (
 )
 from mc_engine.command_line.flight import finish
 from mc_engine.command_line.next_step import after_search
-from mc_engine.interruption import NOTHING_BEGUN, advise, raise_if_signalled
+from mc_engine.interruption import NOTHING_BEGUN, advise, in_threads, raise_if_signalled
 
 if TYPE_CHECKING:
     from mc_engine.campaign.loading import Campaign
@@ -340,8 +340,9 @@ def bench(
         _bench_card(campaign, cases)
         return
     with naming_faults(campaign.model_reference, "the model"):
-        flight = campaign_flight(campaign, cases)
-        timing = measure(flight, (1, registers().doubles, 2 * registers().doubles), repeats)
+        [flight] = in_threads(lambda campaign: campaign_flight(campaign, cases), [campaign])
+        widths = (1, registers().doubles, 2 * registers().doubles)
+        [timing] = in_threads(lambda flight: measure(flight, widths, repeats), [flight])
     typer.echo(f"{campaign.name}: {flight.n_cases} cases a flight, the fastest of {repeats}, one thread")
     for line in _timing_lines(timing, usual_width(flight.model)):
         typer.echo(line)
@@ -352,7 +353,7 @@ def _echo_methods(campaign: "Campaign", cases: int | None, repeats: int) -> None
     from mc_engine.studies.lane_speed import compare_methods
 
     with naming_faults(campaign.model_reference, "the model"):
-        own, *others = compare_methods(campaign, cases, repeats)
+        [[own, *others]] = in_threads(lambda campaign: compare_methods(campaign, cases, repeats), [campaign])
     typer.echo(f"{campaign.name}: methods at the error of the model's own, one thread")
     for timing in (own, *others):
         mark = f", {own.case_s / timing.case_s:5.2f} times as fast" if timing is not own else "  (the model's own)"

@@ -23,6 +23,7 @@ from mc_engine.sampling.distributions import column
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.store.case_rows import Row, RowLog
 from mc_engine.store.parts import CASE_COLUMNS, Column, Part, Written, read_part, revised_name, write_aside
+from mc_engine.store.run_files import NOMINAL_CASE
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 64, 32_768
 CHUNKS_PER_WORKER = 8  # enough for an even end, few enough that parts stay large
@@ -52,7 +53,7 @@ class Lost:
 
 @dataclass(frozen=True, eq=False)  # compared by identity: two tasks may name the same cases
 class Task:
-    """One unit of work for a worker: fly the cases first .. stop - 1 and write their part.
+    """One unit of work for a worker: fly the cases first .. stop - 1, or the nominal, and write their part.
 
     lost : cases that are not flown; their rows hold their inputs and the reason.
     base : an existing part of which only the failed cases are flown again.  failed : these cases.
@@ -82,6 +83,9 @@ class Task:
     def without(self, lost: Lost) -> "Task":
         """A copy of the task in which this case is not flown."""
         return replace(self, lost=(*self.lost, lost))
+
+
+NOMINAL_TASK = Task(NOMINAL_CASE, 0)
 
 
 def run_task(
@@ -141,19 +145,33 @@ def fly_cases(
     batch : cases at a time, if not all.  alone : how many of the first ones fly one by one.  keep : run directory for
     what the cases of a simulator leave behind.  log : of the rows of complete cases.
     """
-    table = case_table(campaign, case_ids)
+    table, noise = drawn(campaign, case_ids)
     edges = [*range(alone), *range(alone, case_ids.size, batch or case_ids.size), case_ids.size]
     flights, flyer = [], flyer or flyer_of(campaign)
-    with naming_faults(campaign.model_reference, f"cases {case_ids.min()} to {case_ids.max()}"):
+    with naming_faults(campaign.model_reference, cases_in_words(case_ids.min(), case_ids.max())):
         for piece in (slice(*edge) for edge in pairwise(edges)):
             inputs = full_inputs(campaign, {name: column[piece] for name, column in table.items()})
             with guard(case_ids[piece]):
-                noise = noise_ids(campaign, case_ids[piece])
                 rows = None if log is None else log.of(case_ids[piece])
-                flights.append(flyer.fly(inputs, noise, rows, keep, stopped))
+                flights.append(flyer.fly(inputs, noise[piece], rows, keep, stopped))
     flight = flights[0] if len(flights) == 1 else _stacked(flights)
     name_upstream(campaign, case_ids, flight)
     return {**table, **flight}
+
+
+def drawn(campaign: Campaign, case_ids: np.ndarray) -> tuple[Columns, np.ndarray]:
+    """(case table, what addresses the noise) of some cases, or of the nominal, which is [NOMINAL_CASE]."""
+    if case_ids.tolist() != [NOMINAL_CASE]:
+        return case_table(campaign, case_ids), noise_ids(campaign, case_ids)
+    row = {dispersion.name: campaign.nominal[dispersion.name] for dispersion in campaign.dispersions}
+    if campaign.upstream is not None:
+        row |= campaign.upstream.nominal_row()
+    return {name: np.asarray([value]) for name, value in row.items()}, np.array([NOMINAL_NOISE])
+
+
+def cases_in_words(first: int, last: int) -> str:
+    """Such as "cases 64 to 127", for messages."""
+    return "the nominal case" if first == NOMINAL_CASE else f"cases {first} to {last}"
 
 
 def _stacked(tables: Sequence[Mapping[str, np.ndarray]]) -> Columns:
@@ -181,18 +199,16 @@ def fly_in_threads(
         return {name: flown[name] for name in wanted}
 
     workers = min(workers, flyer.most_workers or workers)
-    flyer.make_ready()  # once, before several threads ask for it together
+    in_threads(lambda flyer: flyer.make_ready(), [flyer])  # once, before several threads ask for it together
     size = flyer.batch * -(-len(noise) // (flyer.batch * workers))
     pieces = [slice(first, first + size) for first in range(0, len(noise), size)]
-    if len(pieces) == 1:
-        return fly_rows(pieces[0])
     tables = in_threads(fly_rows, pieces, workers)
     return {name: np.concatenate([columns[name] for columns in tables]) for name in wanted}
 
 
 def name_upstream(campaign: Campaign, case_ids: np.ndarray, flight: Columns) -> None:
-    """Say of cases that have nothing to start from what became of theirs upstream."""
-    if campaign.upstream is not None:
+    """Say of cases that have nothing to start from what became of theirs upstream, where the nominal has completed."""
+    if campaign.upstream is not None and case_ids.min() != NOMINAL_CASE:
         reasons = campaign.upstream.refusals(upstream_ids(campaign, case_ids))
         flight["reason"] = np.where(reasons != "", reasons, flight["reason"])
 
@@ -206,7 +222,7 @@ def _lost_rows(campaign: Campaign, lost: Sequence[Lost], names: Sequence[str]) -
         "case_id": ids,
         "status": np.array([case.status for case in lost], dtype=object),
         "reason": np.array([case.reason for case in lost], dtype=object),
-        **case_table(campaign, ids),
+        **drawn(campaign, ids)[0],
     }
     return {name: known.get(name, np.full(ids.size, np.nan)) for name in names}
 
@@ -214,7 +230,7 @@ def _lost_rows(campaign: Campaign, lost: Sequence[Lost], names: Sequence[str]) -
 def _known_rows(campaign: Campaign, rows: Mapping[int, Row], names: Sequence[str]) -> Columns:
     """Rows that were recorded before the run was stopped, with the inputs of their cases."""
     ids = np.array(sorted(rows), dtype=np.int64)
-    known: Columns = {"case_id": ids, **case_table(campaign, ids)}
+    known: Columns = {"case_id": ids, **drawn(campaign, ids)[0]}
     return {
         name: known[name] if name in known else column([rows[case].get(name, np.nan) for case in ids.tolist()])
         for name in names
@@ -236,18 +252,6 @@ def _gathered(names: Sequence[str], tables: Sequence[Mapping[str, Any]]) -> Colu
     filled = [table for table in tables if table]
     by_case = np.argsort(np.concatenate([table["case_id"] for table in filled]))
     return {name: np.concatenate([table[name] for table in filled])[by_case] for name in names}
-
-
-def fly_nominal(campaign: Campaign) -> dict[str, Any]:
-    """The nominal case by column name."""
-    inputs = campaign.nominal
-    ids = np.array([NOMINAL_NOISE])
-    with naming_faults(campaign.model_reference, "the nominal case"):
-        flight = flyer_of(campaign).fly(inputs, ids)
-    dispersed = {dispersion.name: inputs[dispersion.name] for dispersion in campaign.dispersions}
-    if campaign.upstream is not None:
-        dispersed |= campaign.upstream.nominal_row()
-    return {**dispersed, **{name: column[0] for name, column in flight.items()}}
 
 
 def rerun_tasks(run: Path, counted: Sequence[Part]) -> list[Task]:

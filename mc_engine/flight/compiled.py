@@ -1,6 +1,8 @@
 """Compiled models as what flies a campaign's cases."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,7 @@ from mc_engine.flight.contract import breaches, flight_faults, refuse_breaches
 from mc_engine.flight.flyer import Columns, Flyer, Inputs, Process, never
 from mc_engine.flight.kernel import source_digest, usual_width
 from mc_engine.flight.lost_numbers import first_lost, may_be_lost
+from mc_engine.model.fields import AdaptiveStep
 from mc_engine.model.record import compiled_model
 from mc_engine.store.case_rows import RowLog
 
@@ -48,7 +51,11 @@ class CompiledFlyer(Flyer):
         return source_digest(self._model, self._folder)
 
     def make_ready(self) -> None:
-        self.fly(self._campaign.nominal, np.zeros(1, dtype=np.int64))
+        """Fly one step of the nominal case, however long that is."""
+        clock, nominal = self._model.clock, self._campaign.nominal
+        one_step = replace(clock, attempts=1) if isinstance(clock, AdaptiveStep) else replace(clock, until=clock.step)
+        fly = partial(flight.fly, folder=self._folder, width=self._width, clock=one_step, build=self._build)
+        fly(self._model, nominal, np.zeros(1, dtype=np.int64), self._seed)
 
     def faults(self) -> list[str]:
         return breaches(self._campaign)

@@ -23,6 +23,7 @@ from mc_engine.campaign.columns import END_TIME
 from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.errors import EngineError
+from mc_engine.flight.compiled import CompiledFlyer
 from mc_engine.flight.flight import fly, fly_interpreted, grid_of
 from mc_engine.flight.flyer import NOMINAL_NOISE
 from mc_engine.flight.kernel import build_kernel, clock_number
@@ -41,7 +42,7 @@ from mc_engine.flight.repeatability import (
 from mc_engine.garbage_collection import collect_rarely
 from mc_engine.lanes.kernel_cache import form_of, kept_or_made
 from mc_engine.model.faults import MORE, fault_of
-from mc_engine.model.fields import AdaptiveStep, Event, FixedStep
+from mc_engine.model.fields import Event, FixedStep
 from mc_engine.model.phases import due_field, noted_field
 from mc_engine.model.record import Model, compiled_model
 from mc_engine.model.trial import fixed_metrics
@@ -91,11 +92,8 @@ def faults(campaign: Campaign) -> list[str]:
 
 
 def _fly_nominal(campaign: Campaign) -> Columns:
-    """Fly the nominal case, after a single step of it that compiles the kernel; end the process with a sentence if it
-    is not completed."""
-    clock = compiled_model(campaign.model).clock
-    one_step = replace(clock, attempts=1) if isinstance(clock, AdaptiveStep) else replace(clock, until=clock.step)
-    results(campaign, campaign.nominal, _NOMINAL, one_step)
+    """Fly the nominal case, once its kernel is compiled; end the process with a sentence if it is not completed."""
+    CompiledFlyer(campaign).make_ready()
     with _completed_within(LONGEST_S, "the nominal case has", campaign):
         return results(campaign, campaign.nominal, _NOMINAL)
 

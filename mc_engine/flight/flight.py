@@ -11,7 +11,6 @@ from mc_engine.campaign.columns import END_PHASE, END_TIME
 from mc_engine.errors import ModelError
 from mc_engine.flight.kernel import Builder, adaptive_arguments, build_kernel, fixed_arguments, grid_of, usual_width
 from mc_engine.flight.kernel_parts import blocks_of, settings_class
-from mc_engine.interruption import in_another_thread
 from mc_engine.lanes.kernel_data import gathered
 from mc_engine.lanes.philox import noise_key
 from mc_engine.model.designs import designing
@@ -153,7 +152,7 @@ def _fly_group(
         parameters, ids = parameters[:, index], ids[index]
     settings = np.ascontiguousarray(ready.settings[chosen[0]])
     cases = parameters, settings, ready.tables
-    in_another_thread(_bound_kernel(model, clock, folder, width, cases, seed, ids, out, build=build))
+    _bound_kernel(model, clock, folder, width, cases, seed, ids, out, build=build)()
     return tuple(numbers[..., :n] for numbers in out)
 
 
@@ -364,8 +363,7 @@ class _Recorder:
         rows = np.zeros(chosen.size, dtype=np.int64)  # lanes beyond these record nothing
         recording = self._history, rows, pace
         model, ids = self._model, self._case_ids[index]
-        bound = _bound_kernel(model, model.clock, self._folder, self._width, inputs, self._seed, ids, out, recording)
-        in_another_thread(bound)
+        _bound_kernel(model, model.clock, self._folder, self._width, inputs, self._seed, ids, out, recording)()
         return out, rows
 
 

@@ -216,7 +216,7 @@ def _card_kernel(model: Model, folder: Path | None, width: int) -> Callable[...,
 
 
 class CardFlyer(CompiledFlyer):
-    """A compiled model, one case a thread.  Time histories and the nominal fly on the processor."""
+    """A compiled model, one case a thread.  Time histories fly on the processor."""
 
     _width = 1
     _build = staticmethod(_card_kernel)

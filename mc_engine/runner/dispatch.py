@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from mc_engine.errors import WorkersLost
-from mc_engine.flight.chunks import Lost, Task
+from mc_engine.flight.chunks import Lost, Task, cases_in_words
 from mc_engine.flight.flyer import RunStopped
 from mc_engine.runner.worker_process import LATE, take_notes
 from mc_engine.runner.workers import Result, WorkerPool
@@ -127,4 +127,5 @@ class Dispatch:
         """Count a death without a record: the worker died while it started, or of another task."""
         self._unnoted[task.first] += 1
         if self._unnoted[task.first] > MOST_UNNOTED:
-            raise WorkersLost(f"cases {task.first} to {task.stop - 1}: their workers die before any of them flies")
+            who = cases_in_words(task.first, task.stop - 1)
+            raise WorkersLost(f"{who}: the workers die before a case flies")

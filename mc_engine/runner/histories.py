@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mc_engine.campaign.cases import case_table, full_inputs
+from mc_engine.campaign.cases import full_inputs
 from mc_engine.campaign.loading import Campaign
-from mc_engine.campaign.sensitivity_design import noise_ids
-from mc_engine.flight.chunks import CHUNKS_PER_WORKER
+from mc_engine.flight.chunks import CHUNKS_PER_WORKER, drawn
 from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import in_threads
@@ -17,6 +16,7 @@ from mc_engine.runner.summary import metric_parts
 from mc_engine.statistics.worst import WorstSoFar, limits_on
 from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, REFUSED, STATUS_NAME, TIME_LIMIT, WORKER_DIED
 from mc_engine.store.parts import problem_of
+from mc_engine.store.run_files import NOMINAL_CASE
 from mc_engine.store.store import Store
 
 if TYPE_CHECKING:
@@ -29,14 +29,8 @@ def inputs_of(campaign: Campaign, case_id: int | None) -> tuple[dict[str, Any], 
     """(inputs, what addresses the noise) of a case of a campaign, or of its nominal case."""
     if case_id is None:
         return dict(campaign.nominal), NOMINAL_NOISE
-    table, noise = _drawn(campaign, [case_id])
+    table, noise = drawn(campaign, np.array([case_id]))
     return full_inputs(campaign, {name: column[0] for name, column in table.items()}), int(noise[0])
-
-
-def _drawn(campaign: Campaign, case_ids: Sequence[int]) -> tuple[Columns, np.ndarray]:
-    """(case table, what addresses the noise) of some cases."""
-    ids = np.array(case_ids, dtype=np.int64)
-    return case_table(campaign, ids), noise_ids(campaign, ids)
 
 
 def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Callable[[], bool]) -> bool:
@@ -54,7 +48,7 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
     workers = min(workers, flyer.most_workers or workers)
     together = flyer.histories_together
     size = together * max(1, -(-len(saved) // (CHUNKS_PER_WORKER * workers * together)))
-    pieces = [[-1]] if campaign.retention.nominal else []
+    pieces = [[NOMINAL_CASE]] if _saves_nominal(store, campaign, _DANGEROUS) else []
     pieces += [saved[first : first + size] for first in range(0, len(saved), size)]
     flown = in_threads(lambda piece: _histories_of(campaign, flyer, piece, stopped), pieces, workers)
     histories = [columns for piece in flown for columns in piece]
@@ -67,10 +61,10 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
 
 
 def _histories_of(campaign: Campaign, flyer: Flyer, cases: Sequence[int], stopped: Callable[[], bool]) -> list[Columns]:
-    """The histories of some cases, or of the nominal, which is [-1]; none any more once `stopped()` is true."""
+    """The histories of some cases, or of the nominal, as `drawn` takes them; none any more once `stopped()` is true."""
     if stopped():
         return []
-    table, noise = ({}, np.array([NOMINAL_NOISE])) if cases == [-1] else _drawn(campaign, cases)
+    table, noise = drawn(campaign, np.array(cases, dtype=np.int64))
     flights = flyer.histories(full_inputs(campaign, table), noise, campaign.retention.rows)
     wanted = takewhile(lambda _: not stopped(), cases)
     return [_with_case(case, next(flights)[1]) for case in wanted]
@@ -83,9 +77,14 @@ def _are_kept(store: Store, campaign: Campaign, saved: list[int]) -> bool:
         return False
     refused = STATUS_NAME[REFUSED]
     expected = {*saved} - _cases_that_ended(store, (refused,))
-    if campaign.retention.nominal and store.nominal()["status"] != refused:
-        expected.add(-1)
+    if _saves_nominal(store, campaign, (refused, *_DANGEROUS)):
+        expected.add(NOMINAL_CASE)
     return set(store.histories().get("case_id", [])) == expected
+
+
+def _saves_nominal(store: Store, campaign: Campaign, without: Sequence[str]) -> bool:
+    """Whether the history of the nominal is asked for, and its status is none of `without`."""
+    return campaign.retention.nominal and store.nominal()["status"] not in without
 
 
 def cases_to_save(store: Store, campaign: Campaign) -> list[int]:

@@ -18,6 +18,7 @@ from mc_engine.campaign.sections import HistoriesSection
 from mc_engine.errors import CampaignError, Problem, StoreError
 from mc_engine.flight.chunks import name_upstream
 from mc_engine.flight.flyers import flyer_of
+from mc_engine.interruption import in_threads
 from mc_engine.runner.backends import Backend, flyer_on
 from mc_engine.runner.flown_campaign import campaign_of, companions_of, refuse_undeclared_data
 from mc_engine.runner.histories import history_frame, inputs_of
@@ -256,7 +257,8 @@ def replay(path: str | Path, case_id: int) -> Replay:
     campaign = campaign_of(store)
     table, flyer = case_table(campaign, np.array([case_id])), flyer_of(campaign)
     inputs, noise = inputs_of(campaign, case_id)
-    flight, history = next(flyer.histories(inputs, np.array([noise]), HistoriesSection().rows))
+    flights = flyer.histories(inputs, np.array([noise]), HistoriesSection().rows)
+    [(flight, history)] = in_threads(next, [flights])
     name_upstream(campaign, np.array([case_id]), flight)
     stored = store.row(case_id)
     again = {**table, **flight}

@@ -15,9 +15,9 @@ from mc_engine.campaign.sensitivity_design import DESIGN as PICK_FREEZE
 from mc_engine.campaign.sensitivity_design import companion, sensitivity_record
 from mc_engine.durable_file import remove_file
 from mc_engine.errors import DiskError, RunInterrupted, StoreError, WorkersLost
-from mc_engine.flight.chunks import Task, chunk_size, fly_nominal, rerun_tasks
+from mc_engine.flight.chunks import NOMINAL_TASK, Task, chunk_size, rerun_tasks
 from mc_engine.flight.flyers import flyer_of
-from mc_engine.interruption import stop_signal
+from mc_engine.interruption import in_threads, stop_signal
 from mc_engine.runner.backends import Backend
 from mc_engine.runner.dispatch import Dispatch
 from mc_engine.runner.flown_campaign import companions_of
@@ -32,7 +32,7 @@ from mc_engine.store.case_rows import remove_logs
 from mc_engine.store.opening import open_store
 from mc_engine.store.parts import Written, problem_of
 from mc_engine.store.repair import mend_journal, withdraw_damaged
-from mc_engine.store.run_files import JOURNAL, SENSITIVITY, is_run_directory
+from mc_engine.store.run_files import JOURNAL, NOMINAL_CASE, SENSITIVITY, is_run_directory
 from mc_engine.store.store import Store, create_store
 
 
@@ -71,10 +71,9 @@ def _fly_missing(store: Store, campaign: Campaign, session: Session, repair: boo
     missing = sum(task.stop - task.first for task in tasks)
     store.note("started", backend=session.backend.name, workers=session.workers, chunk=size, missing=missing)
     begin = time.perf_counter()
-    _fly_nominal_if_needed(store, campaign, bool(tasks))
-    compiled = time.perf_counter()
-    _run_tasks(store, campaign, session, tasks, lambda task, written: store.publish(written), stop.is_set)
-    if store.missing():
+    nominal = not _has_sound_nominal(store)
+    begun = _run_tasks(store, campaign, session, nominal, tasks, lambda _, part: store.publish(part), stop.is_set)
+    if store.missing() or not _has_sound_nominal(store):
         raise _interrupted(store)
     remove_logs(store.path)
     flown = time.perf_counter()
@@ -83,7 +82,7 @@ def _fly_missing(store: Store, campaign: Campaign, session: Session, repair: boo
         _fly_companion(store, campaign, session, repair, stop)
         if not store.notes("companion"):
             store.note("companion")
-    store.note("finished", prepare_s=round(compiled - begin, 3), fly_s=round(flown - compiled, 3))
+    store.note("finished", prepare_s=round(begun - begin, 3), fly_s=round(flown - begun, 3))
 
 
 @contextmanager
@@ -110,7 +109,7 @@ def _as_writer(store: Store, command: str, session: Session) -> Iterator[threadi
 
 
 def fly_failed(store: Store, campaign: Campaign, session: Session) -> Store:
-    """Fly the cases again that did not complete; a part whose rows come out the same is not replaced."""
+    """Fly the cases again that did not complete, and such a nominal; what comes out the same is not replaced."""
     if store.missing():
         resume = f"`mc-engine resume {shell_word(store.path)}`"
         raise StoreError(f"{store.path}: is not complete; {resume} flies the rest first")
@@ -118,18 +117,20 @@ def fly_failed(store: Store, campaign: Campaign, session: Session) -> Store:
         tasks = rerun_tasks(store.path, store.parts)
         cases = sum(len(task.failed) for task in tasks)
         store.note("rerun", backend=session.backend.name, workers=session.workers, cases=cases)
-        flyer_of(campaign).make_ready()
-        remaining = {task.base.file for task in tasks if task.base}
+        nominal = not _has_sound_nominal(store) or store.nominal()["status"] != STATUS_NAME[OK]
+        remaining = {task.first for task in tasks} | ({NOMINAL_CASE} if nominal else set())
 
         def commit(task: Task, written: Written) -> None:
-            assert task.base is not None  # `rerun_tasks` sets it
-            remaining.discard(task.base.file)
-            if written.part.sha256 == task.base.sha256:
+            remaining.discard(task.first)
+            before = task.base or store.nominal_part
+            if before is not None and written.part.sha256 == before.sha256:
                 remove_file(store.path, written.temporary)
-            else:
+            elif task.base is not None:
                 store.replace(task.base, written)
+            else:
+                store.publish(written)
 
-        _run_tasks(store, campaign, session, tasks, commit, stop.is_set)
+        _run_tasks(store, campaign, session, nominal, tasks, commit, stop.is_set)
         if remaining:
             raise _interrupted(store)
         _fly_histories(store, campaign, session, stop.is_set)
@@ -141,29 +142,41 @@ def _run_tasks(
     store: Store,
     campaign: Campaign,
     session: Session,
+    nominal: bool,
     tasks: list[Task],
     commit: Callable[[Task, Written], None],
     stopped: Callable[[], bool],
-) -> None:
-    """Run the tasks in a worker pool, commit each part that is written, and report the progress."""
+) -> float:
+    """Run the tasks in a worker pool, commit each part that is written, and report the progress.
+
+    nominal : the nominal case flies, before any other begins: it shows what is wrong with a model, and compiles.
+    Returns when the others began, by `time.perf_counter`.
+    """
     counts = store.status_counts()
     done, failed = sum(counts.values()), _failed(counts)
     total = len(store.wanted)
     report = session.progress or (lambda *_: None)
-    report(done, total, failed)
-    if not tasks or stopped():
-        return
+    if not (nominal or tasks) or stopped():
+        report(done, total, failed)
+        return time.perf_counter()
     pool, at_once, flyer = None, True, flyer_of(campaign)
     leaves = flyer.keeps_rows  # its cases may take long
     try:
+        if not nominal:
+            in_threads(lambda flyer: flyer.make_ready(), [flyer])
         pool = pool_of(session.backend, store, campaign, session.workers, stopped)
         dispatch = Dispatch(pool, store.path, session.backend.case_seconds, leaves, flyer.most_workers)
+        for task, written in dispatch.receipts([NOMINAL_TASK] if nominal else [], stopped):
+            commit(task, written)
+        begun = time.perf_counter()
+        report(done, total, failed)
         for task, written in dispatch.receipts(tasks, stopped):
             commit(task, written)
             done += written.part.rows - (task.base.rows if task.base else 0)
             failed += _failed(written.part.status) - (_failed(task.base.status) if task.base else 0)
             report(done, total, failed)
         at_once = leaves and stopped()
+        return begun
     except WorkersLost as error:
         store.note("interrupted", cases=done)
         raise RunInterrupted(f"{error}; {done:,} of {total:,} cases are safe,") from error
@@ -214,15 +227,9 @@ def _fly_companion(store: Store, campaign: Campaign, session: Session, repair: b
         _fly_missing(inner, beside, replace(session, progress=report, chunk=None), repair, stop)
 
 
-def _fly_nominal_if_needed(store: Store, campaign: Campaign, flying: bool) -> None:
-    """Fly the nominal case if it is missing or damaged, or if others are to fly: that compiles the kernel once."""
+def _has_sound_nominal(store: Store) -> bool:
     part = store.nominal_part
-    sound = part is not None and not problem_of(store.path / part.file, store.nominal)
-    if flying or not sound:
-        if sound:
-            flyer_of(campaign).make_ready()
-        else:
-            store.write_nominal(fly_nominal(campaign))
+    return part is not None and not problem_of(store.path / part.file, store.nominal)
 
 
 def _missing_tasks(store: Store, session: Session) -> tuple[list[Task], int]:

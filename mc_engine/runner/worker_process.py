@@ -20,6 +20,7 @@ from mc_engine.errors import StoreError
 from mc_engine.flight.chunks import Task, run_task
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import ignore_signals
+from mc_engine.model.faults import naming_faults
 from mc_engine.runner.flown_campaign import campaign_of
 from mc_engine.runner.workers import keep_freed_memory
 from mc_engine.store.opening import open_store
@@ -74,7 +75,8 @@ def _campaign(setup: WorkerSetup) -> tuple[Campaign, tuple[Column, ...]]:
         raise StoreError(f"{setup.run}: a worker reads {store.n_cases} cases here, and the run has {setup.n_cases}")
     directory = Path(setup.directory)
     campaign = campaign_of(store, directory if directory.is_dir() else None)
-    flyer_of(campaign).make_ready()
+    with naming_faults(campaign.model_reference, "the nominal case"):
+        flyer_of(campaign).make_ready()
     return campaign, store.columns
 
 
@@ -130,7 +132,7 @@ def take_notes(run: Path, case_ids: np.ndarray) -> tuple[str, np.ndarray]:
 def _noted(run: Path, kind: str, case_ids: np.ndarray) -> np.ndarray:
     noted = np.zeros(case_ids.size, dtype=bool)
     for name in names_in(run, "cases"):
-        match = re.fullmatch(rf"\.{kind}-([0-9]{{1,18}})-([0-9]{{1,18}})\.tmp", name)
+        match = re.fullmatch(rf"\.{kind}-(-?[0-9]{{1,18}})-(-?[0-9]{{1,18}})\.tmp", name)
         if match is None:
             continue
         in_record = (case_ids >= int(match[1])) & (case_ids <= int(match[2]))

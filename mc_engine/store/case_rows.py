@@ -20,11 +20,11 @@ import numpy as np
 
 from mc_engine import durable_file as disk
 from mc_engine.errors import DiskError
-from mc_engine.store.run_files import SIMULATOR
+from mc_engine.store.run_files import NOMINAL_CASE, SIMULATOR
 
 MOST_KEPT = 1000  # folders of failed cases in a run
 Row = dict[str, Any]
-_NAME = re.compile(r"\.rows-([0-9]{1,18})-([0-9]{1,18})\.tmp")
+_NAME = re.compile(r"\.rows-(-1|[0-9]{1,18})-([0-9]{1,18})\.tmp")
 
 
 class RowLog:
@@ -89,7 +89,7 @@ class RowLog:
 
 def remove_logs(run: Path) -> None:
     """Remove all logs of a run whose cases are complete, and their folder if nothing else is in it."""
-    for name in _logs(run, 0, 2**62):
+    for name in _logs(run, NOMINAL_CASE, 2**62):
         disk.remove_file(run, name)
     if os.path.lexists(run / SIMULATOR) and not disk.names_in(run, SIMULATOR):
         disk.remove_folder(run, SIMULATOR)

@@ -23,6 +23,7 @@ from mc_engine.durable_file import read_inside, temporary_name, write_inside, wr
 from mc_engine.errors import DiskError, StoreError
 from mc_engine.shell_words import shell_word
 from mc_engine.status import STATUS_NAME
+from mc_engine.store.run_files import NOMINAL, NOMINAL_CASE
 
 MOST_CELLS = 2**30  # of a Parquet file that is read at once
 PART_FOLDERS = ("cases", "history")  # of a run directory
@@ -131,7 +132,7 @@ def _arrow_array(column: Column, values: np.ndarray) -> pa.Array:
     if column.kind == "word":
         if values.size and isinstance(values[0], str) and (values == values[0]).all():  # as a rule; half the time
             return pa.repeat(pa.scalar(str(values[0])), values.size)
-        return pa.array(values, pa.string()).fill_null("")
+        return pa.array(values.astype(object), pa.string(), from_pandas=True).fill_null("")  # NaN of a lost case, too
     if column.kind == "number":
         return pa.array(values.astype(np.float64, copy=False))  # NaN stays NaN and does not become null
     return pa.array(values, ARROW_TYPES[column.kind])
@@ -186,12 +187,13 @@ def write_aside(
     Needs neither lock nor journal; workers write their parts so and send only the receipt.  The name is unique, since
     two workers may write the same chunk if one was taken for dead.  It ends in the first half of the SHA-256, by which
     `finished_parts` recognises a complete part (half, because Windows limits a path to 260 characters).
+    first : NOMINAL_CASE for the nominal case, whose receipt counts no status.
     file : name of the part, relative to the run directory, if not the usual one.
     """
     table = _part_table(run, columns, first, count, arrays)
     content = parquet_bytes(table)
-    file = file or f"cases/{part_name(first, count)}"
-    counts = table.column("status").value_counts().to_pylist()
+    file = file or (NOMINAL if first == NOMINAL_CASE else f"cases/{part_name(first, count)}")
+    counts = [] if first == NOMINAL_CASE else table.column("status").value_counts().to_pylist()
     digest, status = sha256(content).hexdigest(), dict(sorted((row["values"], row["counts"]) for row in counts))
     temporary = temporary_name(f"{file}.{uuid.uuid4().hex[:8]}.{digest[:32]}")
     write_synced(run, temporary, content, file)
@@ -199,7 +201,7 @@ def write_aside(
 
 
 def _part_table(run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any]) -> pa.Table:
-    if first < 0 or count < 1:
+    if count < 1 or (first < 0 and (first, count) != (NOMINAL_CASE, 1)):
         raise StoreError(f"{run}: a part cannot have {count} cases from case {first}")
     case_ids = np.arange(first, first + count, dtype=np.int64)
     if "case_id" in arrays and not np.array_equal(arrays["case_id"], case_ids):
@@ -207,11 +209,11 @@ def _part_table(run: Path, columns: Sequence[Column], first: int, count: int, ar
     return arrow_table(columns, {**arrays, "case_id": case_ids}, count, run)
 
 
-def write_table(run: Path, file: str, table: pa.Table, first: int = 0) -> Part:
-    """Write the table of the nominal case or of time histories durably as `run`/`file`."""
+def write_table(run: Path, file: str, table: pa.Table) -> Part:
+    """Write the table of time histories durably as `run`/`file`."""
     content = parquet_bytes(table)
     write_inside(run, file, content)
-    return Part(file, first, table.num_rows, len(content), sha256(content).hexdigest(), {})
+    return Part(file, 0, table.num_rows, len(content), sha256(content).hexdigest(), {})
 
 
 def read_part(run: Path, part: Part, columns: Sequence[Column] | None = None) -> pa.Table:

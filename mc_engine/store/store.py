@@ -278,8 +278,9 @@ class Store:
             for file in (f"{folder}/{name}" for name in disk.names_in(self.path, folder)):
                 if disk.is_temporary(Path(file).name) or (is_part_file(file) and file not in counted):
                     disk.remove_file(self.path, file)
-        for name in CUT_SHORT:  # not every temporary file: another process may be writing reports
-            disk.remove_file(self.path, name)
+        for name in disk.names_in(self.path):  # not every temporary file: another process may be writing reports
+            if name in CUT_SHORT or (name.startswith(f".{NOMINAL}.") and disk.is_temporary(name)):
+                disk.remove_file(self.path, name)
 
     def append(self, first: int, count: int, columns: Mapping[str, Any]) -> None:
         """Commit the cases first .. first + count - 1; on return they survive a power cut.
@@ -295,10 +296,20 @@ class Store:
     def publish(self, written: Written) -> None:
         """Commit a part that a worker wrote by `parts.write_aside`; on return it survives a power cut."""
         with self.lock():
+            if written.part.file == NOMINAL:
+                self._publish_nominal(written)
+                return
             self._refuse_overlap(written.part.first, written.part.rows)
             leave_receipt(self.path, written.part)
             self._rename(written)
             self._record("part", asdict(written.part))
+
+    def _publish_nominal(self, written: Written) -> None:
+        if self.nominal_part is not None:
+            # Otherwise a kill between file and line would leave the new file with the old line.
+            self._record("nominal-withdrawn", {})
+        self._rename(written)
+        self._record("nominal", asdict(written.part))
 
     def replace(self, before: Part, written: Written) -> None:
         """Commit a part by `parts.write_aside` in place of `before`, which has the same cases and another name."""
@@ -337,12 +348,8 @@ class Store:
     def write_nominal(self, row: Mapping[str, Any]) -> None:
         """Commit the nominal case.  row : a value for each column but case_id."""
         arrays = {name: np.asarray([value]) for name, value in {**row, "case_id": -1}.items()}
-        table = parts.arrow_table(self.columns, arrays, 1, self.path / NOMINAL)
         with self.lock():
-            if self.nominal_part is not None:
-                # Otherwise a kill between file and line would leave the new file with the old line.
-                self._record("nominal-withdrawn", {})
-            self._record("nominal", asdict(parts.write_table(self.path, NOMINAL, table, first=-1)))
+            self.publish(parts.write_aside(self.path, self.columns, -1, 1, arrays))
 
     def write_histories(self, table: "pd.DataFrame | Mapping[str, Any]") -> None:
         """Commit time histories (case_id, t_s and outputs, one row per sample) in place of earlier ones."""

@@ -18,6 +18,7 @@ from mc_engine.durable_file import write_durably
 from mc_engine.errors import ModelError
 from mc_engine.flight.chunks import fly_cases
 from mc_engine.flight.flight import chosen_cases
+from mc_engine.interruption import in_threads
 from mc_engine.model.record import Model
 from mc_engine.studies.published import Record, Value, lock_file, read_published
 
@@ -46,7 +47,7 @@ def computed_values(path: Path, *, slow: bool = True, progress: Progress | None 
         if progress is not None:
             progress(number, len(records), record["quantity"])
         try:
-            value = computer.value_of(record)
+            [value] = in_threads(computer.value_of, [record])
         except (ModelError, ValueError) as error:
             raise ModelError(f"{path.parent.name}, {record['quantity']!r}: {error}") from None
         if value is not None:

@@ -16,23 +16,25 @@ FORKING = {**ENVIRONMENT, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "
 SERVER = """
 import json, os, sys, time
 from pathlib import Path
+import numpy as np
 import broken_builds
 from mc_engine import load_campaign
 from mc_engine.runner import pools
 from mc_engine.runner import runner
-from mc_engine.flight.chunks import NOMINAL_NOISE, fly_nominal
+from mc_engine.flight.chunks import NOMINAL_NOISE, fly_cases
 from mc_engine.flight.flight import fly_history
 
 folder, chunk, workers = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
 if len(sys.argv) > 4:
     broken_builds.BREAKS[sys.argv[4]](setattr)
 campaign = load_campaign(folder / "campaign.toml")
-fly_nominal(campaign)
+fly_cases(campaign, np.array([-1]))
 fly_history(campaign.model, campaign.nominal, NOMINAL_NOISE, campaign.seed, folder=campaign.directory)
 run_task = pools.run_task
 
 def noted(campaign, columns, run, task, **named):
-    os.write(log, b"%d\\n" % task.first)
+    if task.first >= 0:  # the nominal is no chunk
+        os.write(log, b"%d\\n" % task.first)
     return run_task(campaign, columns, run, task, **named)
 
 pools.run_task = noted

@@ -68,7 +68,8 @@ def waiting(folder, address, *options):
     command = [sys.executable, "-m", "mc_engine", *map(str, words), "--scheduler", address]
     process = subprocess.Popen(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + LONGEST_S
-    while not (folder / "run" / "nominal.parquet").exists():
+    journal = folder / "run" / "journal.jsonl"
+    while not journal.exists() or '"started"' not in journal.read_text():
         assert process.poll() is None, process.communicate()[1]
         assert time.monotonic() < deadline
         time.sleep(0.05)

@@ -45,7 +45,11 @@ def check_one_failure(folder, flown, kind, n, number, lasting=False):
 def _file(path):
     """The name of the file that a temporary one was to become."""
     name = path.name
-    return name[1:].split(".parquet")[0] if name.startswith(".part") else name.removesuffix(".tmp").lstrip(".")
+    return (
+        name[1:].split(".parquet")[0]
+        if name.startswith((".part", ".nominal"))
+        else name.removesuffix(".tmp").lstrip(".")
+    )
 
 
 def _may_be_passed_over(kind, path):

@@ -6,13 +6,15 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 from trapped import ENVIRONMENT
 
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.campaign.search import SHIPPED
-from mc_engine.flight.chunks import fly_nominal
+from mc_engine.flight.chunks import fly_cases
 from mc_engine.interruption import COMPLETING
+from mc_engine.store.run_files import NOMINAL_CASE
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signals from process to process")
 
@@ -35,7 +37,7 @@ def model(tmp_path_factory):
         assert old in text
         text = text.replace(old, new)
     (folder / "model.py").write_text(text)
-    fly_nominal(load_campaign(with_burn(folder, SOON)))
+    fly_cases(load_campaign(with_burn(folder, SOON)), np.array([NOMINAL_CASE]))
     return folder
 
 

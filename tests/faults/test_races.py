@@ -34,13 +34,14 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the racers are 
 SERVER = """
 import json, mmap, os, sys, time
 from pathlib import Path
+import numpy as np
 from mc_engine import load_campaign
 from mc_engine.runner import runner
-from mc_engine.flight.chunks import fly_nominal
+from mc_engine.flight.chunks import fly_cases
 from mc_engine.errors import EngineError
 
 campaign, chunk = load_campaign(Path(sys.argv[1]) / "campaign.toml"), int(sys.argv[2])
-fly_nominal(campaign)
+fly_cases(campaign, np.array([-1]))
 print(json.dumps("ready"), flush=True)
 for line in sys.stdin:
     verb, run, moments = json.loads(line)

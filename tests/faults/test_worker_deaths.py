@@ -193,6 +193,34 @@ def test_a_case_that_takes_too_long_and_one_that_eats_its_memory_are_given_up(tm
     assert frame[rest].drop(columns="trap").equals(plain[rest].drop(columns="trap"))
 
 
+@pytest.mark.parametrize(
+    ("backend", "trap", "seconds", "end"),
+    [
+        ("loky", 1, None, ["worker-died", "the process flying this case died"]),
+        ("loky", 2, 3.0, ["time-limit", "took longer than 3 s"]),
+        pytest.param("dask", 2, 3.0, ["time-limit", "took longer than 3 s"], marks=pytest.mark.slow),
+    ],
+)
+def test_a_nominal_that_dies_or_hangs_leaves_its_row_and_every_case_and_flies_when_asked_again(
+    tmp_path, monkeypatch, backend, trap, seconds, end
+):
+    campaign = trapped(tmp_path / "campaign", 200)
+    monkeypatch.setenv("NOMINAL_TRAP", f"{trap}")
+    run = runner.run(campaign, tmp_path / "run", workers=2, backend=Backend(backend, case_seconds=seconds))
+    nominal = run.nominal()
+    assert [nominal["status"], nominal["reason"]] == end
+    assert nominal["height_m"] == 100.0
+    assert np.isnan(nominal["end_height_m"])
+    assert set(run.histories()["case_id"]) == {0, 1}
+    assert damage(run.path) == []
+    monkeypatch.delenv("NOMINAL_TRAP")
+    whole = runner.run(campaign, tmp_path / "whole", workers=2, chunk=CHUNK)
+    assert run.cases().equals(whole.cases())
+    again = runner.rerun(run.path, workers=1)
+    assert (again.path / "nominal.parquet").read_bytes() == (whole.path / "nominal.parquet").read_bytes()
+    assert again.histories().equals(whole.histories())
+
+
 @pytest.mark.parametrize("backend", ["threading", "loky"])
 def test_a_model_that_calls_exit_is_told_and_not_waited_for(tmp_path, backend):
     campaign = trapped(tmp_path / "campaign", 100, {70: 4})

@@ -3,13 +3,16 @@
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
 
+from mc_engine.campaign.loading import load_campaign
 from mc_engine.command_line.next_step import is_complete
-from mc_engine.interruption import COMPLETING, NOTHING_BEGUN, ONCE_MORE
+from mc_engine.interruption import COMPLETING, NOTHING_BEGUN, ONCE_MORE, in_threads
+from mc_engine.runner import runner
 from tests.mc_engine.store.small_run import ENVIRONMENT
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signals from process to process")
@@ -114,6 +117,38 @@ def test_two_signals_end_a_kernel_that_python_cannot_interrupt(tmp_path):
     rest = f"interrupted; what was committed is safe, `mc-engine resume {run}` flies the rest"
     assert done.returncode == 4
     assert done.stderr.splitlines()[-2:] == [COMPLETING, rest]
+
+
+@pytest.mark.parametrize(
+    ("words", "pauses_s"),
+    [(("replay", "RUN", "3"), "0.5"), (("bench", "minimal"), "0.5"), (("rare", "minimal"), "0.5, 1.0")],
+)
+def test_signals_end_a_kernel_of_a_command_that_is_no_run(tmp_path, monkeypatch, words, pauses_s):
+    """The first one, but for a search, which has the flights under way complete."""
+    monkeypatch.chdir(tmp_path)
+    if words[0] == "replay":
+        runner.run(load_campaign("minimal", cases=20), tmp_path / "RUN", workers=1)
+    status, said = ended(KERNEL, f"return lambda: work({pauses_s})", *words)
+    assert (status, said.split(";")[0]) == (4, "interrupted")
+
+
+def test_items_that_are_not_begun_when_one_fails_are_left():
+    begun = []
+
+    def work(item):
+        begun.append(item)
+        if item == 2:
+            raise ValueError("two")
+        time.sleep(0.1)
+        return -item
+
+    assert in_threads(work, [0, 1, 3], 2) == [0, -1, -3]
+    assert in_threads(work, []) == []
+    begun.clear()
+    with pytest.raises(ValueError, match="two"):
+        in_threads(work, range(9))
+    time.sleep(0.3)
+    assert begun == [0, 1, 2, *begun[3:4]]
 
 
 def test_a_signal_while_the_command_line_is_loaded_says_that_nothing_was_begun():

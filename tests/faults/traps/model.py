@@ -1,13 +1,15 @@
 """A stone that falls, and cases that take their worker with them: `trap` kills it, hangs it, eats its memory or exits.
 
 The traps stand where a model's own Python runs, in `prepare`; those named in the environment variable TRAPS_OFF
-(their numbers, with commas) do nothing.  STONES_SLEEP_S makes every chunk take so long; the first that sleeps makes the
-file STONES_ASLEEP.
+(their numbers, with commas) do nothing.  NOMINAL_TRAP is the trap of the nominal case, where it flies as a task; what
+the engine asks of `prepare` before a run begins, it answers.  STONES_SLEEP_S makes every chunk take so long; the first
+that sleeps makes the file STONES_ASLEEP.
 """
 
 import os
 import sys
 import time
+import traceback
 from collections import namedtuple
 from pathlib import Path
 
@@ -36,7 +38,10 @@ def prepare(inputs, settings, refusals):
             Path(asleep).touch()
         time.sleep(float(os.environ.get("STONES_SLEEP_S", "0")))
     off = os.environ.get("TRAPS_OFF", "").split(",")
-    armed = {trap for trap in np.unique(inputs.trap) if f"{trap:g}" not in off}
+    traps = {*np.unique(inputs.trap)}
+    if inputs.trap.size == 1 and "run_task" in [frame.f_code.co_name for frame, _ in traceback.walk_stack(None)]:
+        traps.add(float(os.environ.get("NOMINAL_TRAP", "0")))
+    armed = {trap for trap in traps if f"{trap:g}" not in off}
     if KILLS in armed:
         os._exit(9)
     if HANGS in armed:

@@ -91,6 +91,12 @@ def test_histories_hold_the_nominal_and_the_first_cases(flown):
     )
 
 
+def test_the_nominal_is_committed_before_any_other_case_begins(flown):
+    events = [entry.event for entry in flown.notes()]
+    assert events[:4] == ["created", "started", "nominal", "part"]
+    assert events.count("nominal") == 1
+
+
 def test_the_worst_cases_keep_their_histories(tmp_path):
     text = load_campaign("minimal").text.replace(
         "histories = { nominal = true, first = 3 }",

@@ -14,7 +14,8 @@ from mc_engine.errors import StoreError
 from mc_engine.store import parts
 from mc_engine.store.journal import Journal
 from mc_engine.store.opening import open_store
-from mc_engine.store.run_files import is_run_directory
+from mc_engine.store.parts import write_aside
+from mc_engine.store.run_files import NOMINAL_CASE, is_run_directory
 from mc_engine.store.store import create_store
 from mc_engine.store.verification import damage
 
@@ -159,6 +160,28 @@ def test_a_kill_while_the_nominal_is_replaced_leaves_no_nominal_rather_than_dama
     with pytest.raises(KeyboardInterrupt):
         store.write_nominal(row(8))
     assert open_store(store.path).nominal() == {}
+
+
+def test_a_nominal_that_a_worker_wrote_is_committed_or_removed_by_the_next_writer(store):
+    arrays = {name: np.asarray([value]) for name, value in row(7).items()}
+    with store.lock():
+        written = write_aside(store.path, store.columns, NOMINAL_CASE, 1, arrays)
+        write_aside(store.path, store.columns, NOMINAL_CASE, 1, arrays)  # another worker's, whose writer is killed
+        store.publish(written)
+    content, line = (store.path / "nominal.parquet").read_bytes(), store.notes("nominal")[-1].facts
+    assert len([*store.path.glob(".nominal.parquet.*.tmp")]) == 1
+    with open_store(store.path).lock():
+        assert not [*store.path.glob(".nominal.parquet.*.tmp")]
+    store.write_nominal(row(7))
+    assert (store.path / "nominal.parquet").read_bytes() == content
+    assert store.notes("nominal")[-1].facts == line
+    assert (line["first"], line["rows"], line["status"]) == (-1, 1, {})
+
+
+def test_a_case_that_was_not_flown_has_empty_words(store):
+    store.append(0, 10, {**block(0, 10), "control": np.array(["off", *[np.nan] * 9], dtype=object)})
+    store.append(10, 1, {**block(10, 1), "control": np.array([np.nan])})
+    assert store.cases()["control"].tolist() == ["off", *[""] * 10]
 
 
 def test_histories_come_back_with_units_and_replace_those_kept_before(store):
