@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, beyond_chance
-from reports.contributors.tornado_figure import STRONGEST, contributor_figure, name_of, strongest, surely, surely_acts
+from reports.contributors.tornado_figure import STRONGEST, contributor_figure, name_of, strongest
 from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.run.chosen_units import spread_text
-from reports.run.contributions import MOST_METRICS, UNEXPLAINED, Contributions, Contributor
+from reports.run.contributions import MOST_METRICS, UNEXPLAINED, Contributions, Contributor, surely
 from reports.run.flown import Flown
 from reports.text.numbers import count, counted, fixed, number, percent
 
@@ -85,6 +85,9 @@ def _about(flown: Flown, contributions: Contributions, metric: str, k: int) -> I
         yield f"R² {contributions.trends.r_squared[k]:.2f}"
     sigma = flown.summaries[metric].sd
     if sigma:
+        if _correlated(contributions) is not None:
+            yield f"σ {spread_text(flown, metric, sigma)}"
+            return
         explained = float(
             np.hypot.reduce(
                 [sigma_contribution(contributor, sigma) or 0.0 for contributor in contributions.by_metric[metric]]
@@ -98,7 +101,7 @@ def _about(flown: Flown, contributions: Contributions, metric: str, k: int) -> I
 
 def sigma_contribution(contributor: Contributor, sigma: float) -> float | None:
     """The part of a metric's σ that an input causes by itself; None where noise could have done so."""
-    sure = surely(contributor.first_interval) and surely_acts(contributor)
+    sure = surely(contributor.first_interval) and contributor.surely_acts
     if contributor.input == UNEXPLAINED or contributor.first is None or not sure:
         return None
     return float(np.sqrt(max(contributor.first, 0.0))) * sigma
@@ -149,15 +152,22 @@ def _note(flown: Flown, contributions: Contributions, shown: list[str]) -> str:
         f"Estimated from the table of cases. {unexplained}{each} SRC, PRCC and Spearman: trends with their direction. "
         "R²: fraction of the variance that the linear regression behind SRC explains."
     )
-    if contributions.trends.correlated is not None:
-        first, second, rho = contributions.trends.correlated
-        if beyond_chance(rho, contributions.n_tried):
-            note += (
-                f" Inputs are correlated, most of all {flown.words(first)} and {flown.words(second)} "
-                f"(rank correlation {number(rho, 2)}): first-order and Spearman include what an input owes to its "
-                "correlation; total effects require independent inputs and are left out."
-            )
+    correlated = _correlated(contributions)
+    if correlated is not None:
+        first, second, rho = correlated
+        note += (
+            f" Inputs are correlated, most of all {flown.words(first)} and {flown.words(second)} "
+            f"(rank correlation {number(rho, 2)}): first-order effects, 1σ contributions and Spearman include what an "
+            "input owes to its correlation, so that they overlap and do not add up to σ; total effects require "
+            "independent inputs and are left out."
+        )
     return note
+
+
+def _correlated(contributions: Contributions) -> tuple[str, str, float] | None:
+    """The two inputs with the strongest correlation of those beyond chance, and their rank correlation."""
+    pair = None if contributions.trends is None else contributions.trends.correlated
+    return pair if pair is not None and beyond_chance(pair[2], contributions.n_tried) else None
 
 
 def _beyond_total(contributor: Contributor) -> bool:

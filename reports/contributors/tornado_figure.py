@@ -48,25 +48,12 @@ def strongest(contributors: Sequence[Contributor]) -> list[Contributor]:
         (contributor for contributor in contributors if contributor.input != UNEXPLAINED),
         key=lambda contributor: -contributor.size,
     )
-    sure = [contributor for contributor in named[1:STRONGEST] if contributor.size >= SMALL and surely_acts(contributor)]
+    sure = [contributor for contributor in named[1:STRONGEST] if contributor.size >= SMALL and contributor.surely_acts]
     return [
         *named[:1],
         *sure,
         *(contributor for contributor in contributors if contributor.input == UNEXPLAINED and contributor.size >= LEFT),
     ]
-
-
-def surely_acts(contributor: Contributor) -> bool:
-    """Whether the total effect is surely above zero, as a first-order effect can be none without it.
-
-    Without a total effect (inputs are correlated), whether the first-order effect is.
-    """
-    return surely(contributor.first_interval if contributor.total is None else contributor.total_interval)
-
-
-def surely(interval: tuple[float, float] | None) -> bool:
-    """Whether the interval of an effect excludes zero."""
-    return interval is not None and interval[0] > 0.0
 
 
 def _effect_array(effects: Iterable[tuple[float | None, tuple[float, float] | None]]) -> np.ndarray:

@@ -52,6 +52,19 @@ class Contributor:
         """What contributors are ranked by: the total effect, or what is known of it."""
         return max(value for value in (self.total, self.first, 0.0) if value is not None)
 
+    @property
+    def surely_acts(self) -> bool:
+        """Whether the total effect is surely above zero, as a first-order effect can be none without it.
+
+        Without a total effect (inputs are correlated), whether the first-order effect is.
+        """
+        return surely(self.first_interval if self.total is None else self.total_interval)
+
+
+def surely(interval: Interval | None) -> bool:
+    """Whether the interval of an effect excludes zero."""
+    return interval is not None and interval[0] > 0.0
+
 
 @dataclass(frozen=True)
 class Contributions:
@@ -74,6 +87,11 @@ class Contributions:
     def held(self) -> bool:
         """Whether flights with a contributor at its nominal value are among them."""
         return any(row.fall is not None for row in self.rows())
+
+    def acting(self, metric: str) -> list[str]:
+        """The inputs that surely contribute to a metric, alone or in their group, the strongest first."""
+        sure = [row.input for row in self.by_metric.get(metric, ()) if row.surely_acts]
+        return [name for contributor in sure for name in self.members.get(contributor, [contributor])]
 
     def rows(self) -> Iterator[Contributor]:
         """All contributors, metric by metric."""

@@ -21,7 +21,10 @@ def history_figures(flown: Flown) -> list[HistoryFigure]:
 
 
 def scatter_figures(flown: Flown) -> list[ScatterFigure]:
-    """The model's scatter plots; of a model without any, the metrics that matter over their strongest contributors."""
+    """The model's scatter plots; of a model without any, the metrics that matter over their strongest contributors.
+
+    Without an input that surely contributes to a metric, over the one that seems to.
+    """
     own = [figure for figure in flown.figures if isinstance(figure, ScatterFigure)]
     return own or list(_suggested(flown))[:MOST_SCATTERS]
 
@@ -30,8 +33,10 @@ def _suggested(flown: Flown) -> Iterator[ScatterFigure]:
     for metric in flown.key_metrics:
         if flown.summaries[metric].constant or not flown.summaries[metric].n_used:
             continue
-        for contributor in flown.contributors(metric):
-            if np.isfinite(flown.values(contributor.name)).any():
-                title = f"{flown.words(metric)} over its strongest contributor, {flown.words(contributor.name)}"
-                yield ScatterFigure(contributor.name, metric, title[:1].upper() + title[1:])
+        acting = [] if flown.contributions is None else flown.contributions.acting(metric)
+        for name in [*acting, *(contributor.name for contributor in flown.contributors(metric))]:
+            if np.isfinite(flown.values(name)).any():
+                what = "its strongest contributor, " if name in acting else ""
+                title = f"{flown.words(metric)} over {what}{flown.words(name)}"
+                yield ScatterFigure(name, metric, title[:1].upper() + title[1:])
                 break

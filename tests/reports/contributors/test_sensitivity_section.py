@@ -8,7 +8,7 @@ from synthetic_run import synthetic_run
 
 from reports.contents import build
 from reports.contributors.sensitivity import sensitivity_blocks
-from reports.document.blocks import FigureBlock, Table, Text
+from reports.document.blocks import FigureBlock, Table, Text, blocks_of
 from reports.drawing import paper, screen
 from reports.formats.json_data import render_json
 from reports.run.flown import Flown
@@ -186,3 +186,22 @@ def test_names_with_markup_stay_text():
             column["description"] = "<b>$x$</b>"
     panel = screen.specifications(block(section(run), FigureBlock, "Success probability").drawing)[0]
     assert "<b>" not in json.dumps(panel)
+
+
+def test_1_sigma_contributions_of_correlated_inputs_are_not_added_up():
+    run = synthetic_run(2000, failed=0)
+    run.table["oe_pct"] = run.table["ve_pct"] + run.table["oe_pct"] / 2.0
+    run.table["settling_time_s"] = run.table["ve_pct"] + run.table["oe_pct"]
+    table = block(section(run), Table, "Contributors to each metric")
+    assert not any("root sum square" in row[0].small for row in table.rows)
+    assert any("σ" in row[0].small for row in table.rows)
+    assert "do not add up to σ" in table.note
+
+
+def test_a_scatter_plot_names_a_strongest_contributor_only_where_an_input_surely_contributes():
+    run = synthetic_run(300, failed=0)
+    run.manifest["figures"] = []
+    run.table["settling_time_s"] = np.random.Generator(np.random.Philox(key=7)).standard_cauchy(300)
+    captions = {one.caption for one in blocks_of(build(run, "run"), FigureBlock)}
+    assert "Propellant over its strongest contributor, ve." in captions
+    assert captions & {"Settling time over ve.", "Settling time over oe."}
