@@ -1,10 +1,13 @@
 """Running estimates: how a mean or quantile develops with the number of cases, and whether it has converged.
 
-An estimate from all cases has converged if both hold:
+An estimate from all cases has converged if all of these hold:
 - its interval reaches no farther from it than a stated part of the metric's standard deviation (`CLOSE_MEAN`,
   `CLOSE_QUANTILE`), so that more cases cannot change it much;
 - the first and the second half of the cases differ no more than by chance (`DRIFT`), so that it does not drift with the
-  case number, which independent cases never do.
+  case number, which independent cases never do;
+- a mean is not that of a few extreme cases: the mean of |x - mean|³, in units of σ³, is at most 0.2 √n.  This ratio
+  bounds the error of a normal interval (Berry and Esseen: Feller, An Introduction to Probability Theory, vol. 2, 2nd
+  ed., XVI.5); as a rule of thumb it is Cochran's n > 25 γ₁² (Sampling Techniques, 3rd ed., 2.15) for either side.
 
 The order is that of the case numbers.  The first n cases of `lhs` are no Latin hypercube of n: their intervals, those
 of independent draws, are conservative.
@@ -22,6 +25,7 @@ from mc_engine.statistics.order_statistics import quantile
 FEWEST = 20  # cases with a number
 CLOSE_MEAN, CLOSE_QUANTILE = 0.05, 0.20  # of the standard deviation of the metric
 DRIFT = 0.01  # p-value of the difference of the halves
+HEAVY = 0.2  # larger `tails` are those of a few extreme cases
 PLACES = 40
 SMALLEST_SHARE = 0.005  # of the cases, at the first place
 
@@ -33,6 +37,7 @@ class RunningEstimate:
     probability : of a quantile; None for the mean.  cases : int64[k], tried so far.  n_used of n_tried have a number.
     reach : of the last interval from the estimate, in standard deviations; None where it has an open end.
     halves_p : probability of a difference like that of the two halves, or a larger one, by chance alone.
+    tails : of the cases behind a mean, their mean |x - mean|³ over σ³ √n; 0 for a quantile, whose interval is exact.
     """
 
     probability: float | None
@@ -44,6 +49,7 @@ class RunningEstimate:
     n_tried: int
     reach: float | None
     halves_p: float
+    tails: float = 0.0
 
     @property
     def close(self) -> float:
@@ -53,7 +59,8 @@ class RunningEstimate:
     @property
     def settled(self) -> bool:
         """Whether the estimate has converged, as the module defines it."""
-        return self.reach is not None and self.reach <= self.close and self.halves_p >= DRIFT
+        near = self.reach is not None and self.reach <= self.close
+        return near and self.halves_p >= DRIFT and self.tails <= HEAVY
 
     @property
     def cases_wanted(self) -> int | None:
@@ -95,6 +102,7 @@ def running_mean(values: np.ndarray, confidence: float = 0.90) -> RunningEstimat
         values.size,
         float(half[-1] / deviation[-1]),
         erfc(apart / sqrt(2.0)),
+        float(np.mean(np.abs(off / off.std()) ** 3) / sqrt(off.size)),
     )
 
 

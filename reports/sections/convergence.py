@@ -84,8 +84,9 @@ def _convergence_table(flown: Flown, told: dict[str, tuple[RunningEstimate, ...]
         f"{number(CLOSE_MEAN)} standard deviations of the metric for a mean, {number(CLOSE_QUANTILE)} for a percentile "
         "(column “bounds within”), and the first and second half of the cases do not differ beyond chance "
         f"(probability at least {percent(DRIFT)}; Welch’s test of the means, Fisher’s of the cases beyond the "
-        "percentile). Bounds are those of independent draws: Student’s for the mean, order statistics for "
-        "percentiles. "
+        "percentile). A mean that a few extreme cases dominate has not converged: its bounds are wrong too often, and "
+        "a metric with very heavy tails has no mean. Bounds are those of "
+        "independent draws: Student’s for the mean, order statistics for percentiles. "
         "A metric that has not converged may have a certain verdict: that depends on its requirement alone."
     )
     return Table(f"Convergence of the estimates{flown.sample_words}", columns, rows, note)
@@ -115,7 +116,9 @@ def _converged_cell(run: RunningEstimate) -> Cell:
     if run.settled:
         return Cell("converged", tone="good")
     if run.reach is not None and run.reach <= run.close:
-        return Cell("no", small="the halves differ", tone="bad")
+        if run.halves_p < DRIFT:
+            return Cell("no", small="the halves differ", tone="bad")
+        return Cell("not yet", small="few extreme cases dominate", tone="open")
     wanted = f"needs about {count(_two_digits_up(run.cases_wanted))} cases" if run.cases_wanted else "needs more cases"
     return Cell("not yet", small=wanted, tone="open")
 

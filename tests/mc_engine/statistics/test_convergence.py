@@ -50,3 +50,15 @@ def test_independent_cases_are_said_to_drift_no_more_often_than_stated(estimate)
     # stated 1 %; three sigma of 400 trials are 1.5 %
     alarms = [estimate(draws(400, key)).halves_p < 0.01 for key in range(400)]
     assert np.mean(alarms) < 0.01 + 0.015
+
+
+@pytest.mark.parametrize("law", [stats.cauchy(), stats.pareto(1.5), stats.lognorm(2.0)])
+def test_a_mean_that_a_few_extreme_cases_dominate_has_not_settled(law):
+    draw = np.random.Generator(np.random.Philox(key=5))
+    assert np.mean([running_mean(law.rvs(2000, random_state=draw)).settled for _ in range(100)]) < 0.1
+
+
+def test_a_mean_of_moderately_skewed_cases_settles():
+    draw = np.random.Generator(np.random.Philox(key=5))
+    assert all(running_mean(1e9 + 1e-3 * draw.exponential(size=2000)).reach < 0.05 for _ in range(20))
+    assert np.mean([running_mean(draw.exponential(size=2000)).settled for _ in range(100)]) > 0.95
