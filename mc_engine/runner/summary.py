@@ -130,8 +130,8 @@ def verdict_line(verdict: "Verdict", units: Mapping[str, str]) -> str:
 
 def _limit_words(verdict: "Verdict") -> str:
     if verdict.at_least is not None and verdict.at_most is not None:
-        return f"within {verdict.at_least:,.12g} to {verdict.at_most:,.12g}"
-    return f"≤ {verdict.at_most:,.12g}" if verdict.at_least is None else f"≥ {verdict.at_least:,.12g}"
+        return f"within {verdict.at_least:,.15g} to {verdict.at_most:,.15g}"
+    return f"≤ {verdict.at_most:,.15g}" if verdict.at_least is None else f"≥ {verdict.at_least:,.15g}"
 
 
 def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, Summary]":

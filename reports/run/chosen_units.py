@@ -101,12 +101,13 @@ class ShownRun(Flown):
         return self._units[name]
 
     def _fine(self, name: str, unit: str) -> bool:
-        """Whether a metric spreads so little that a larger unit would hide it: 1 s of an end of burn after 6 hours."""
+        """Whether a larger unit would hide how far a metric spreads, and is from its limits: 1 s after 6 hours."""
         summary = self._own.summaries.get(name)
-        if summary is None or not summary.spread or self._own.limits(name) != Limits():
+        if summary is None or not summary.spread or summary.mean is None:
             return False
         chosen = chosen_unit(unit, self._sizes(name))
-        return chosen != unit and convert(summary.spread, unit, chosen) < FINE
+        apart = [abs(limit - summary.mean) for limit in self._own.limits(name) if limit is not None]
+        return chosen != unit and convert(max([summary.spread, *apart]), unit, chosen) < FINE
 
     def _sizes(self, name: str) -> list[float | None]:
         """What the numbers of a column come to, in the table and in the histories, and its limits."""

@@ -44,7 +44,10 @@ def number(value: float | None, digits: int = 5, scale: float | None = None) -> 
         return "0"
     coarse = scale is not None and isfinite(scale) and scale >= 1e-4  # a small value needs no digits of its own
     if abs(value) >= 1e7 or (abs(value) < 1e-4 and not coarse):
-        mantissa, exponent = f"{value:.{max(digits - 2, 2)}e}".split("e")
+        decimals = max(digits - 2, 2)
+        if scale is not None and isfinite(scale) and scale > 0.0:
+            decimals = max(decimals, min(2 + floor(log10(abs(value))) - floor(log10(scale)), MOST_GIVEN - 1))
+        mantissa, exponent = f"{value:.{decimals}e}".split("e")
         return _power(_trim(mantissa), int(exponent))
     decimals = max(digits - 1 - floor(log10(abs(value))), 0)
     if scale is not None and isfinite(scale) and scale > 0.0:

@@ -16,6 +16,8 @@ from reports.formats.json_data import render_json
 from reports.formats.markdown import render_markdown
 from reports.run.chosen_units import ShownRun, chosen_unit, spread_text
 from reports.run.flown import Flown
+from reports.sections.requirement_tables import requirement_table
+from reports.text.numbers import number
 
 
 @pytest.mark.parametrize(
@@ -70,6 +72,21 @@ def test_a_metric_has_one_unit_on_all_pages_and_on_the_axes(slow):
     axes = [plot.x.label for one in blocks_of(document, FigureBlock) for plot in one.drawing.plots]
     assert "settling time [days]" in axes
     assert "time [days]" in axes
+
+
+def test_a_limit_close_to_large_values_keeps_its_digits():
+    """A range of 1e9 m that may be exceeded by 4 mm: in km, limit and values would all read 1 000 000 km."""
+    run = synthetic_run(2000, failed=0)
+    run.table["max_position_error_m"] = 1e9 + 1e-3 * np.sin(np.arange(2000.0))
+    run.manifest["requirements"] = [
+        {"name": "range", "metric": "max_position_error_m", "at_most": 1e9 + 0.004, "share": 0.9, "confidence": 0.9}
+    ]
+    told = ShownRun(Flown(run, "run"))
+    assert told.unit("max_position_error_m") == "m"
+    (row,) = requirement_table(told).rows
+    assert "1.000000000004·10⁹" in row[1].text
+    low, high = (number(end, 4, told.summaries["max_position_error_m"].spread) for end in (1e9 - 1e-3, 1e9 + 1e-3))
+    assert (low, high) == ("9.99999999999·10⁸", "1.000000000001·10⁹")
 
 
 def test_a_spread_is_told_in_the_unit_of_its_metric_or_in_its_own():
