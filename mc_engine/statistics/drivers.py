@@ -20,6 +20,7 @@ from mc_engine.statistics.binomial import clopper_pearson, hypergeometric_tails
 from mc_engine.statistics.input_columns import InputColumn, average_ranks, equal_bins, finite_rows, input_columns
 
 FALSE_DISCOVERIES = 0.05  # at most this share of what is reported, on average
+ONE_END = 1.96  # standard deviations between the two halves of an input: 5 % by chance
 FEWEST = 5  # failed, and passed, cases for a single driver
 FEWEST_FOR_PAIRS = 10
 MOST_LEVELS = 20  # of a group that enters pairs
@@ -31,7 +32,8 @@ BINS = 10  # of the success probability along an input
 class Driver:
     """An input, or a pair, that separates failed from passed cases.
 
-    where : at what values cases fail, one text an input: "high", "low", "at both ends", "in the middle", or a level.
+    where : at what values cases fail, one text an input: "high", "low", "at both ends", "at the high end", "at the low
+        end", "in the middle", or a level.
     effect : Cliff's delta, 2 P(a failed case ranks above a passed one) - 1, in the direction of `where`; 1 separates
         all, 0 none.  adjusted : p-value after Benjamini & Hochberg.
     inside_failed of inside_tried : of a pair, cases in the cell `where` (outer thirds of numbers); 0 of a single one.
@@ -181,9 +183,25 @@ def _rank_test(requirement: str, column: InputColumn, failed: np.ndarray) -> Dri
     if p_trend <= p_spread:
         where, effect = ("high" if trend > 0.0 else "low"), abs(trend)
     else:
-        where, effect = ("at both ends" if spread > 0.0 else "in the middle"), abs(spread)
+        where, effect = (_ends(column.values, ranks, failed) if spread > 0.0 else "in the middle"), abs(spread)
     p_value = min(1.0, 2.0 * min(p_trend, p_spread))  # two were tried
     return Driver(requirement, (column.name,), (where,), effect, p_value, p_value)
+
+
+def _ends(values: np.ndarray, ranks: np.ndarray, failed: np.ndarray) -> str:
+    """At which ends of the values cases fail: at one, where the two halves of the cases differ beyond chance."""
+    upper = ranks > 0.5 * (ranks.size + 1)
+    rise, fall = (_normal_score(average_ranks(values[half]), failed[half]) for half in (upper, ~upper))
+    apart = (rise + fall) / np.sqrt(2.0)  # failures of the lower half lie at its low end
+    return "at both ends" if abs(apart) < ONE_END else f"at the {'high' if apart > 0.0 else 'low'} end"
+
+
+def _normal_score(ranks: np.ndarray, failed: np.ndarray) -> float:
+    """A separation in its standard deviations; 0 where all cases fail, or none."""
+    if failed.all() or not failed.any():
+        return 0.0
+    separation, p_value = _separation(ranks, failed)
+    return float(-np.sign(separation) * scipy.special.ndtri(max(0.5 * p_value, np.finfo(float).tiny)))
 
 
 def _separation(ranks: np.ndarray, failed: np.ndarray) -> tuple[float, float]:
