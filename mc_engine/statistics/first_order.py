@@ -19,22 +19,31 @@ MOST_CASES = 20_000  # above, so many are picked evenly
 def first_order(column: InputColumn, table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First-order index and its standard error per metric (columns of `table`, float64[n, n_metrics], finite).
 
-    The variance between bins of the input, or between the levels of a group, with the part that chance alone puts
-    between them taken off (Kelley's ε², Proc. Natl. Acad. Sci. 21 (1935), 554-559; hence it may come out below 0);
-    bins after Plischke, Borgonovo & Smith, Eur. J. Oper. Res. 226 (2013), 536-550, with 0.7 sqrt(n) of them.
-    The error is that of the influence function of the ratio of the two variances; at an index of 0 it is
-    sqrt(2) too large.
+    1 less the variance that is left in bins of the input about a straight line in each, or about the mean of each level
+    of a group; as many degrees of freedom are taken off (Kelley's ε², Proc. Natl. Acad. Sci. 21 (1935), 554-559; hence
+    the index may come out below 0).  The 0.7 sqrt(n) bins are those of Plischke, Borgonovo & Smith, Eur. J. Oper. Res.
+    226 (2013), 536-550.  Without the lines, what a metric changes within the wide outer bins would count as noise.
+    The error is that of the influence function of the ratio of the two variances, too large at an index of 0.
     """
     n = len(table)
     index, bins = equal_bins(column, min(max(int(0.7 * np.sqrt(n)), 2), MOST_BINS))
-    if n <= 2 * bins or bins < 2:
+    if bins < 2:
         return np.full(table.shape[1], np.nan), np.full(table.shape[1], np.nan)
-    centred = standardised(table)
+    centred, place = standardised(table), standardised(column.values[:, None])[:, 0]
     members = scipy.sparse.csr_array((np.ones(n), (index, np.arange(n))), shape=(bins, n))
-    mean = ((members @ centred) / members.sum(axis=1)[:, None])[index]
-    inside = centred - mean
-    share = 1.0 - (inside**2).sum(axis=0) / (n - bins) * (n - 1) / n
-    influence = mean**2 + 2.0 * mean * inside - share * centred**2
+    size = members.sum(axis=1)
+    mean = (members @ centred) / size[:, None]
+    off = place - (members @ place / size)[index]
+    width = members @ off**2
+    sloped = width > 0.0 if not column.levels else np.zeros(bins, dtype=bool)
+    parameters = bins + int(np.count_nonzero(sloped))
+    if n <= 2 * parameters:
+        return np.full(table.shape[1], np.nan), np.full(table.shape[1], np.nan)
+    slope = np.where(sloped, 1.0 / np.where(sloped, width, 1.0), 0.0)[:, None] * (members @ (off[:, None] * centred))
+    fitted = mean[index] + off[:, None] * slope[index]
+    inside = centred - fitted
+    share = 1.0 - (inside**2).sum(axis=0) / (n - parameters) * (n - 1) / n
+    influence = fitted**2 + 2.0 * fitted * inside - share * centred**2
     return share, influence.std(axis=0) / np.sqrt(n)
 
 

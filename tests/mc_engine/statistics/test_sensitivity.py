@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from mc_engine.sampling.streams import uniforms
+from mc_engine.statistics.first_order import first_order
+from mc_engine.statistics.input_columns import input_columns
 from mc_engine.statistics.sensitivity import sensitivity
 
 N = 2**13
@@ -92,3 +94,18 @@ def test_cases_without_a_number_are_counted_and_change_nothing_else():
     assert indices.n_tried == 500
     for index in ("spearman", "src", "prcc", "first_order"):
         assert getattr(indices, index)[:, 0] == pytest.approx(getattr(alone, index)[:, 0], rel=1e-12)
+
+
+@pytest.mark.parametrize("n", [100, 1000])
+def test_the_interval_of_a_first_order_index_covers_the_true_one(n):
+    """The interval of 90 % in 200 campaigns; bins without slopes covered an index of 1 never, one of 0.8 in 60 %."""
+    truths = {"all of it": 1.0, "linear": 4.0 / 5.25, "noisy": 0.8}
+    covered = {name: [] for name in truths}
+    for seed in range(200):
+        a, b, c, noise = np.random.Generator(np.random.Philox(key=seed)).normal(size=(4, n))
+        metrics = {"all of it": 1e-12 * (1.0 + 0.1 * a), "linear": 2.0 * a + b + 0.5 * c, "noisy": a + 0.5 * noise}
+        table = np.column_stack([*metrics.values()])
+        share, error = first_order(*input_columns({"a": a}), table)
+        for name, index, reach in zip(metrics, share, 1.645 * error, strict=True):
+            covered[name].append(abs(index - truths[name]) <= reach + 1e-9)
+    assert min(np.mean(hits) for hits in covered.values()) > 0.8
