@@ -215,8 +215,9 @@ def _never_set(campaign: Campaign, flown: Columns) -> Iterator[str]:
         if not metric.sometimes and not np.isfinite(values).any():
             word = "infinite in all" if np.isinf(values).any() else "not a number in any"
             yield (
-                f'the metric "{metric.name}" is {word} of the {values.size} cases that flew; let `evaluate` '
-                "set it, or declare it with sometimes=True if it exists only with some settings"
+                f'the metric "{metric.name}" is {word} of the {values.size} cases that flew; look at `evaluate`, or at '
+                "the output or the event that it is declared by, or declare it with sometimes=True if it exists only "
+                "with some settings"
             )
 
 

@@ -75,8 +75,8 @@ def where(mask, x, y):
     if type(mask) is bool and type(x) is float and type(y) is float:
         return x if mask else y  # nearly all that an interpreted flight asks for
     _refuse_number(mask, "where")
-    if hasattr(x, "_fields") or hasattr(y, "_fields"):
-        if type(x) is not type(y):
+    if isinstance(x, tuple) or isinstance(y, tuple):
+        if type(x) is not type(y) or not hasattr(x, "_fields"):
             raise ModelError("`where` chooses between numbers, or between named tuples of one class")
         return type(x)(*(where(mask, *fields) for fields in zip(x, y, strict=True)))
     if _is_condition(x) or _is_condition(y):

@@ -83,7 +83,7 @@ def fault_of_trial(error: Exception) -> str:
     elif unknown := _UNKNOWN_FIELD.match(text):
         text = f'{unknown[1]}(...) has no field "{unknown[2]}"{_hint_of_field(error, unknown[1], unknown[2])}'
     elif not isinstance(error, EngineError):  # which says the fix itself
-        text = f"{type(error).__name__}: {_ARRAY.sub('a number', text)}{_hint_of_attribute(error)}; {PHYSICS}"
+        text = f"{type(error).__name__}: {_ARRAY.sub('a number', text)}{_hint_of_attribute(error) or f'; {PHYSICS}'}"
     return f"{source_place(frame.f_code.co_filename, line) if frame else 'the model'}: {text}"
 
 

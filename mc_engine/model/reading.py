@@ -61,7 +61,10 @@ FOR_DEBUGGING = (
     "histories are to show"
 )
 _TUPLES = "keep numbers in tuples and named tuples"
-_KEEP = "what changes is kept in the state or in the memory, and a record is made anew, State(...) with every field"
+_KEEP = (
+    "what changes is kept in the state or in the memory, and a record is made anew, State(...) with every field or "
+    "replace(s, x=...) of mc_engine.lanes"
+)
 _OWN = "a case depends on its inputs and case_id alone: noise comes from the `draws` of `control`"
 _RETURN = "physics computes and returns; write def and `return`"
 # The usual fix of what is not on the list; without one, the list itself.

@@ -86,16 +86,23 @@ def _run_through(model: Model, p: Any, o: Any, seed: int, finite: bool) -> None:
     # as in kernels: dividing by zero gives an infinity
     o = type(o)(*(value if name == TABLES else np.float64(value) for name, value in zip(o._fields, o, strict=True)))
     t = np.zeros(FEW)
-    s = _call(model, "initial", p, o)
-    m = NoMemory(0.0) if model.start is None else _call(model, "start", p, o)
+    s = _of_cases(_call(model, "initial", p, o))
+    m = NoMemory(0.0) if model.start is None else _of_cases(_call(model, "start", p, o))
     if finite:
         _refuse_infinite("initial", model.initial, (p, o), s, "the state")
     for number in range(1, len(model.phases)):
         _try_phase(model, t, s, m._replace(**{PHASE: number + t}), p, o, seed, False)
     m = _try_phase(model, t, s, m, p, o, seed, finite)
-    seen = _call(model, "observe", t, s, m, p, o)
+    seen = _of_cases(_call(model, "observe", t, s, m, p, o))
     best = _looks(model, seen)
     _call(model, "evaluate", t, s, m, p, o, best, type(best)(*(np.zeros(FEW) for _ in best)))
+
+
+def _of_cases(record: Any) -> Any:
+    """The record with an array in place of each number, as a flight has it: cases that begin alike differ later."""
+    if hasattr(record, "_fields"):
+        return type(record)(*map(_of_cases, record))
+    return np.full(FEW, record, dtype=np.float64)
 
 
 def _try_phase(model: Model, t: Any, s: Any, m: Any, p: Any, o: Any, seed: int, finite: bool) -> Any:
@@ -103,7 +110,7 @@ def _try_phase(model: Model, t: Any, s: Any, m: Any, p: Any, o: Any, seed: int, 
     if model.control is not None:
         sampled = _call(model, "control", t, s, m, p, o, Draws(noise_key(seed), 0.0, 0.0))
         _same_record(model.control, "control", sampled, "start", m)
-        m = sampled
+        m = _of_cases(sampled)
     with suppress(_ByZero):
         derivative = _call(model, "rhs", t, s, m, p, o)
         rhs = _of_phase(model.rhs, (t, s, m, p, o))

@@ -2,7 +2,8 @@
 
 `exponential` is one layer, and with EXPONENTIALS the textbook atmosphere of a planet.  `layered` joins the layers of
 Vallado's table from 100 to 700 km and is for orbits and de-orbit arcs (tens of percent of day-to-day variation are
-not modelled).  `us76` is for entry: the 1976 standard, exact from the ground to 86 km, tabulated above.
+not modelled).  `us76` is for entry: the 1976 standard, exact from the ground to 86 km, tabulated above, and far too
+thin for orbits beyond 200 km.
 """
 
 import math
@@ -131,8 +132,9 @@ def us76_logarithm(h):
     """(ln rho, its slope [1/m], molecular-scale temperature [K]) at geometric altitude h [m].
 
     U.S. Standard Atmosphere, 1976, eqs (18), (23), (33a), (33b): exact to 86 km.  Above, its tabulated densities, the
-    logarithm linear in between and going on beyond 200 km; the temperature is then that of 86 km, which serves for a
-    Mach number and nothing else.  The lowest layer goes on below the ground.
+    logarithm linear in between: up to 8 % too dense to 150 km, up to 15 % to 200 km.  Beyond, it goes on in line: a
+    fifth of the standard's density at 300 km, a fiftieth at 400 km; take `layered` there.  The temperature is that of
+    86 km from there on, which serves for a Mach number and nothing else.  The lowest layer goes on below the ground.
     """
     # both sides of 86 km are computed, so the altitude of each stays within its own
     low = minimum(h, US76_TOP)

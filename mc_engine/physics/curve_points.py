@@ -69,7 +69,10 @@ def _csv(path: Path) -> dict[str, np.ndarray]:
         try:
             rows.append([float(cell) for cell in cells])
         except ValueError:
-            raise ModelError(f'{path.name}, line {number}: "{line.strip()}" are not all numbers') from None
+            raise ModelError(
+                f'{path.name}, line {number}: "{line.strip()}" are not all numbers; write one for each column, with '
+                "commas between"
+            ) from None
     return dict(zip(names, np.array(rows).reshape(-1, len(names)).T, strict=True))
 
 

@@ -58,6 +58,10 @@ class Curve(PhysicsFunction):
 
     def __call__(self, *args: Any) -> Any:
         """The value at the argument(s), interpreted: floats or arrays, SI."""
+        wanted = self.function.__code__.co_argcount
+        if len(args) != wanted:
+            numbers = "one number, x" if wanted == 1 else "two numbers, x and y"
+            raise ModelError(f"{self.words} is a function of {numbers}; it was given {len(args)}")
         if Number not in map(type, args):
             return self.function(*args)
         plain = [float(argument) if type(argument) is Number else argument for argument in args]

@@ -105,7 +105,7 @@ LINES = [
     ("g = g * RNG.normal()", "noise comes from the `draws`", "import numpy as np\nRNG = np.random.default_rng()"),
     ("a = rhs(t, s, m, p, o)", "`rhs` calls itself; physics has no recursion", f"# none{HERE}"),
     ("g = s.x.sum()", "functions are those of mc_engine.lanes"),
-    ("return s._replace(x=s.vx)", "State(...) with every field"),
+    ("return s._replace(x=s.vx)", "State(...) with every field or replace(s, x=...) of mc_engine.lanes"),
     ("g = g * Earth.mu[0]", "a list outside of physics changes", "class Earth:\n    mu = [1.0]"),
     ("g = Foo(g).x", "make it a namedtuple", "class Foo:\n    def __init__(self, x):\n        self.x = x"),
     ("g = g * EARTH.mu", "`Planet` is not for physics",
@@ -145,12 +145,12 @@ LINES = [
     ("g = where(s.x, g, 2.0 * g)", "compare the number, such as x > 0.5"),
     ("g = g * 1.0 if any_lane(s.x) else g", "compare the number, such as x > 0.5"),
     ("far = where(s.x > 0.0, s.y > 0.0, s.y < 0.0)", "write (mask & x) | ((not mask) & y)"),
-    ("far = where(s.x > 0.0, (s.x, s.y), (s.y, s.x))", ALLOWED),
+    ("far = where(s.x > 0.0, (s.x, s.y), (s.y, s.x))", "between named tuples of one class"),
     ("far = (s.x > 0.0) & s.y", ALLOWED),
     ("a = 2.0 * s", ALLOWED),
     ("g = g.norm()", "a number has no attribute 'norm'; write it with"),
-    ("g = g * s.vz", "object has no attribute 'vz'; known are \"x\", \"y\", \"vx\", \"vy\""),
-    ("g = g * p.burn_dv_m_s", "a column's name is without its unit in physics, \"burn_dv\""),
+    ("g = g * s.vz", "object has no attribute 'vz'; known are \"x\", \"y\", \"vx\", \"vy\"$"),
+    ("g = g * p.burn_dv_m_s", "a column's name is without its unit in physics, \"burn_dv\"$"),
     ("g = s.x(2.0)", "a number is not callable; write it with"),
     ("g = g + 0.0 * o.foo", "has no attribute 'foo'"),
     ("g = g * tan(s.x)", "name 'tan' is not defined; write it with"),
@@ -166,6 +166,17 @@ def test_a_line_that_is_not_for_physics_is_named_with_its_fix(tmp_path):
         sentence = refused(folder, with_lines(lines, *before, setting="law" if "o.law" in lines else ""))
         expected = r"model\.py, line \d+: `@physics`: " if "calls itself" in words else place(folder, lines)
         assert re.match(expected, sentence), (lines, sentence)
+        assert words in f"{sentence}$", (lines, sentence)
+
+
+def test_a_decision_by_the_state_is_told_also_where_all_cases_start_alike(tmp_path):
+    start = "    return State(x=r, y=0.0, vx=dv * sin(p.pitch_error), vy=sqrt(MU_EARTH / r) + dv * cos(p.pitch_error))"
+    alike = (start, "    return State(x=7e6, y=0.0, vx=0.0, vy=7.5e3)")
+    told_of = [line for line in LINES if line[1] == EACH_CASE]
+    assert len(told_of) > 10
+    for number, (lines, words, *before) in enumerate(told_of):
+        sentence = refused(tmp_path / str(number), [alike, *with_lines(lines, *before)])
+        assert re.match(place(tmp_path / str(number), lines), sentence), (lines, sentence)
         assert words in sentence, (lines, sentence)
 
 

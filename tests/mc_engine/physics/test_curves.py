@@ -203,6 +203,7 @@ def test_what_is_wrong_with_a_file_is_said(folder):
     for text, message in [
         ("", "empty"),
         ("x,y\n1\n", "line 2: 1 numbers for 2 columns"),
+        ("x;y\n1;2\n", 'line 2: "1;2" are not all numbers; write one for each column, with commas between'),
         ("x,y\n1,2\n2,b\n", 'line 3: "2,b"'),
         ("x,z\n1,2\n", 'no column "y"'),
         ("x,y\n1,2\n", "two or more points"),

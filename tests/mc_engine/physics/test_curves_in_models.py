@@ -61,9 +61,9 @@ THRUST = "time_s,thrust_n\n0,2\n1,2\n2,6\n5,6\n"
 DRAG = "speed_m_s,mass_kg,drag_n\n" + "\n".join(f"{v},{m},{0.1 * v}" for v in (0, 20) for m in (1, 5))
 
 
-def sled(folder, thrust=THRUST, kind="linear", outside="held"):
+def sled(folder, thrust=THRUST, kind="linear", outside="held", text=MODEL):
     folder.mkdir(exist_ok=True)
-    (folder / "model.py").write_text(MODEL.format(kind=kind, outside=outside))
+    (folder / "model.py").write_text(text.format(kind=kind, outside=outside))
     (folder / "thrust.csv").write_text(thrust)
     (folder / "drag.csv").write_text(DRAG)
     return load_model("model.py", folder)
@@ -115,6 +115,16 @@ def test_the_files_count_as_the_models_data_and_a_changed_one_is_another_model(t
     other = sled(tmp_path, THRUST.replace("6", "7"))
     assert dict(other.sources.named())["thrust.csv"] != dict(model.sources.named())["thrust.csv"]
     assert flown(other)["end_v_m_s"][0] > flown(model)["end_v_m_s"][0]
+
+
+def test_a_curve_with_another_number_of_arguments_is_named_with_those_that_it_takes(tmp_path):
+    for number, (called, words) in enumerate({
+        "THRUST(t, v) - DRAG(v, mass)": "the curve thrust.csv is a function of one number, x; it was given 2",
+        "THRUST(t) - DRAG(v)": "the surface drag.csv is a function of two numbers, x and y; it was given 1",
+    }.items()):  # fmt: skip
+        model = sled(tmp_path / str(number), text=MODEL.replace("THRUST(t) - DRAG(v, mass)", called))
+        with pytest.raises(ModelError, match=rf"^model\.py, line 17: `return {re.escape(called)}`: {words};"):
+            flown(model)
 
 
 def test_a_case_ends_where_its_curve_does(tmp_path):

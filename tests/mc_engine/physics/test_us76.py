@@ -18,6 +18,9 @@ ALOFT = [
     (150e3, 2.076e-9),
     (200e3, 2.541e-10),
 ]
+# table I between and beyond the altitudes that the densities go through
+BETWEEN = [(140e3, 3.831e-9, 1.08), (160e3, 1.233e-9, 1.15), (170e3, 7.815e-10, 1.15), (180e3, 5.194e-10, 1.15)]
+BETWEEN += [(300e3, 1.916e-11, 0.20), (400e3, 2.803e-12, 0.021)]
 # geopotential bases of the layers, as geometric altitudes [m]
 BASES = [6_356_766.0 * b / (6_356_766.0 - b) for b in (11e3, 20e3, 32e3, 47e3, 51e3, 71e3)]
 
@@ -30,6 +33,12 @@ def test_density_is_the_printed_one_to_86_km(h, density):
 @pytest.mark.parametrize(("h", "density"), ALOFT)
 def test_density_goes_through_the_table_above(h, density):
     assert us76(h) == pytest.approx(density, rel=1e-12)
+
+
+@pytest.mark.parametrize(("h", "density", "ratio"), BETWEEN)
+def test_density_between_and_beyond_the_table_is_off_by_what_the_docstring_says(h, density, ratio):
+    """Straight lines of the logarithm miss its bend: too dense between the points, too thin beyond the last."""
+    assert us76(h) / density == pytest.approx(ratio, rel=0.06)
 
 
 # table I of the standard: geometric altitude [m], molecular-scale temperature [K]
