@@ -14,6 +14,7 @@ from mc_engine.statistics.input_columns import InputColumn, equal_bins, finite_r
 MOST_BINS = 100
 FEWEST_CASES = 20
 MOST_CASES = 20_000  # above, so many are picked evenly
+_ROUNDING = 1e-24  # of a bin's variance: what remains of equal values
 
 
 def first_order(column: InputColumn, table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -35,7 +36,7 @@ def first_order(column: InputColumn, table: np.ndarray) -> tuple[np.ndarray, np.
     mean = (members @ centred) / size[:, None]
     off = place - (members @ place / size)[index]
     width = members @ off**2
-    sloped = width > 0.0 if not column.levels else np.zeros(bins, dtype=bool)
+    sloped = (width > _ROUNDING * size) & (not column.levels)
     parameters = bins + int(np.count_nonzero(sloped))
     if n <= 2 * parameters:
         return np.full(table.shape[1], np.nan), np.full(table.shape[1], np.nan)

@@ -109,3 +109,11 @@ def test_the_interval_of_a_first_order_index_covers_the_true_one(n):
         for name, index, reach in zip(metrics, share, 1.645 * error, strict=True):
             covered[name].append(abs(index - truths[name]) <= reach + 1e-9)
     assert min(np.mean(hits) for hits in covered.values()) > 0.8
+
+
+def test_a_number_of_few_values_is_as_good_as_their_names():
+    step, noise = (draws(2, 700)[0] * 7).astype(int), draws(2, 700)[1]
+    values, names = np.array([0.1, 0.3, 0.7, 1.1, 1.3, 1.7, 1.9])[step], np.array(list("abcdefg"))[step]
+    (table,) = (np.sin(5.0 * values) + noise)[None, :, None]
+    by_value, by_name = (first_order(*input_columns({"x": x}), table) for x in (values, names))
+    assert by_value[0] == pytest.approx(by_name[0], rel=1e-12)
