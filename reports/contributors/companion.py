@@ -95,7 +95,8 @@ def _about(flown: Flown, contributions: Contributions, metric: str, k: int) -> I
         )
         rest = float(np.sqrt(max(sigma - explained, 0.0)) * np.sqrt(sigma + explained))  # squares may overflow
         told = [spread_text(flown, metric, value) for value in (sigma, explained, rest)]
-        beyond = f"rest {told[2]}" if explained <= sigma else "above σ by chance in the estimates"
+        within = explained <= sigma or told[0] == told[1]
+        beyond = f"rest {told[2]}" if within else "above σ by chance in the estimates"
         yield f"σ {told[0]}; root sum square {told[1]}, {beyond}"
 
 
