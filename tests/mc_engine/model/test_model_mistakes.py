@@ -172,12 +172,10 @@ def test_a_line_that_is_not_for_physics_is_named_with_its_fix(tmp_path):
 def test_a_decision_by_the_state_is_told_also_where_all_cases_start_alike(tmp_path):
     start = "    return State(x=r, y=0.0, vx=dv * sin(p.pitch_error), vy=sqrt(MU_EARTH / r) + dv * cos(p.pitch_error))"
     alike = (start, "    return State(x=7e6, y=0.0, vx=0.0, vy=7.5e3)")
-    told_of = [line for line in LINES if line[1] == EACH_CASE]
-    assert len(told_of) > 10
-    for number, (lines, words, *before) in enumerate(told_of):
+    for number, (lines, words, *before) in enumerate(line for line in LINES if line[1] == EACH_CASE):
         sentence = refused(tmp_path / str(number), [alike, *with_lines(lines, *before)])
-        assert re.match(place(tmp_path / str(number), lines), sentence), (lines, sentence)
-        assert words in sentence, (lines, sentence)
+        assert re.match(place(tmp_path / str(number), lines) + f".*{re.escape(words)}", sentence), (lines, sentence)
+    assert number > 10
 
 
 def test_two_functions_that_call_one_another_are_recursion(tmp_path):
@@ -371,10 +369,9 @@ def test_what_only_the_compiler_finds_is_one_sentence_with_the_line_too(tmp_path
 
 
 ADAPTIVE = [(CLOCK, "AdaptiveStep(until=10_000.0)"), ("FixedStep", "AdaptiveStep")]
-UNEQUAL = ["an output more", "an output fewer", "a state more"]
 
 
-@pytest.mark.parametrize("mistake", UNEQUAL)
+@pytest.mark.parametrize("mistake", ["an output more", "an output fewer", "a state more"])
 @pytest.mark.parametrize("clock", [[], ADAPTIVE], ids=["fixed", "adaptive"])
 def test_no_kernel_is_built_for_other_counts_than_the_model_declares(mistake, clock, tmp_path, monkeypatch):
     monkeypatch.setattr(flight, "refuse_unfit", lambda *model: None)
