@@ -34,7 +34,7 @@ def test_deaths_of_workers_find_a_runner_that_forgets_their_chunks(tmp_path):
 
 
 def test_deadly_cases_find_a_runner_that_blames_their_neighbours(tmp_path):
-    with pytest.raises(RED, match=r"\[32, 33, .*\] == \[40\]"):
+    with pytest.raises(RED, match=r"\[(32, 33|40, 41), .*\] == \[40\]"):  # sixteen, or eight, fly at a time
         test_worker_deaths.check_isolated(tmp_path, 100, [40], "loky", broken="suspects_given_up")
 
 

@@ -23,6 +23,7 @@ from distributed import Client
 
 from mc_engine import load_campaign
 from mc_engine.campaign.loading import Campaign
+from mc_engine.flight.chunks import NOMINAL_TASK
 from mc_engine.runner import runner, worker_process
 from mc_engine.runner.backends import Backend
 from mc_engine.runner.cluster_pool import ClusterWorkerPool
@@ -145,7 +146,8 @@ def fly(
         waits.append(time.perf_counter() - wall - (time.thread_time() - processor))
 
     def counted_begin(pool: ClusterWorkerPool, task: Any) -> None:
-        begun.append(task.stop - task.first)
+        if task is not NOMINAL_TASK:
+            begun.append(task.stop - task.first)
         begin_task(pool, task)
 
     with patch.object(Store, "publish", timed_publish), patch.object(ClusterWorkerPool, "begin", counted_begin):
