@@ -110,7 +110,8 @@ def run_task(
     fresh = flown[~np.isin(flown, [*known])]
     flights = []
     if fresh.size:
-        flight = fly_cases(campaign, fresh, batch, guard or _unguarded, len(task.alone), run, log, stopped, flyer)
+        keep = run if task.first != NOMINAL_CASE else None
+        flight = fly_cases(campaign, fresh, batch, guard or _unguarded, len(task.alone), keep, log, stopped, flyer)
         flights.append({**flight, "case_id": fresh})
     names = [column.name for column in columns]
     if known:
