@@ -5,12 +5,16 @@ with `record_property(what, number)`, and the processes of `-n` hand it on with 
 """
 
 import os
+import sys
 
 import pytest
 from hypothesis import settings
 
 # The processes of `-n` share the cores; of the threads that linear algebra starts in each, most wait for the others.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Tests start hundreds of processes; without kept bytecode each of them would compile the sources of all libraries.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")

@@ -22,26 +22,40 @@ SIZE = 249_000  # bytes, just within what is read at all
 SENTENCE_S = 1.0  # of processor time; most take up to 0.4 s
 
 
+def seconds(call):
+    """Processor time of this thread, the least of three where other work on the machine makes it long."""
+    least = np.inf
+    for _ in range(3):
+        begin = time.thread_time()
+        call()
+        least = min(least, time.thread_time() - begin)
+        if least < SENTENCE_S:
+            break
+    return least
+
+
 def limit_s():
-    """What a sentence may take; on a slow or busy machine, three times what Python's own reader takes for the text."""
-    begin = time.thread_time()
-    tomllib.loads("x = [" + filled("-1,") + "]")
-    return max(SENTENCE_S, 3.0 * (time.thread_time() - begin))
+    """What a sentence may take; on a slow machine, six times what Python's own reader takes for the text."""
+    return max(SENTENCE_S, 6.0 * seconds(lambda: tomllib.loads("x = [" + filled("-1,") + "]")))
 
 
 def refused(text, directory=None):
     """The sentences about a campaign text, which must come soon."""
+    sentences = []
+
+    def load():
+        with pytest.raises(CampaignError) as caught:
+            load_campaign("x.toml", text=text, directory=directory)
+        sentences.append(str(caught.value))
+
     load_campaign("deorbit")  # the model is imported once, and not on the clock
     gc.freeze()  # what other tests have left in this process is not searched for waste on the clock
-    begin = time.thread_time()
-    with pytest.raises(CampaignError) as caught:
-        load_campaign("x.toml", text=text, directory=directory)
-    duration = time.thread_time() - begin
+    duration = seconds(load)
     gc.unfreeze()
     assert duration < SENTENCE_S or duration < limit_s()
-    assert len(str(caught.value)) < 300_000
-    assert all(letter.isprintable() or letter == "\n" for letter in str(caught.value))
-    return str(caught.value)
+    assert len(sentences[0]) < 300_000
+    assert all(letter.isprintable() or letter == "\n" for letter in sentences[0])
+    return sentences[0]
 
 
 def filled(unit):

@@ -183,6 +183,15 @@ def running(word):
     return found
 
 
+def doing(pid):
+    """What the threads of a process wait for, to be read where a test fails."""
+    folder = Path(f"/proc/{pid}")
+    try:
+        return [(task / "stat").read_text().split()[2] + (task / "wchan").read_text() for task in folder.glob("task/*")]
+    except OSError:
+        return ["has ended"]
+
+
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
 def test_children_left_behind_are_ended(tmp_path, faulty):
     failing, cases = faulty
@@ -242,10 +251,10 @@ def test_a_killed_engine_resumes_without_flying_a_finished_case_twice(tmp_path, 
         time.sleep(0.01)
     os.kill(engine.pid, signal.SIGKILL)
     engine.wait()
-    end = time.monotonic() + 20.0  # a process that is still starting learns of it when it has started
-    while time.monotonic() < end and running(f"\0{engine.pid}\0"):
+    end = time.monotonic() + 120.0  # a process that is still starting learns of it when it has started
+    while time.monotonic() < end and running(f"\0{engine.pid}\0"):  # the last argument of the processes it started
         time.sleep(0.1)
-    assert running(f"\0{engine.pid}\0") == []  # the last argument of the processes that it started
+    assert [(pid, doing(pid)) for pid in running(f"\0{engine.pid}\0")] == []
     resume(tmp_path / "run", workers=2)
     flown = Counter(starts.read_text().split())
     # in flight at the kill: a case or its last lines a worker; the nominal and the first two for their histories
