@@ -7,6 +7,7 @@ from tests.benchmarks import peers, work_precision
 from tests.benchmarks.peer_codes import engine, handwritten, problems, scipy_peer
 from tests.benchmarks.peer_codes.contest import Contest, hold
 
+OTHERS = ("transfer", "ballistic", "lifting")
 A_MILLIMETRE = 1e-3
 TEN_MICROMETRES = 1e-5
 
@@ -18,7 +19,7 @@ def told(contest):
     return results
 
 
-@pytest.mark.parametrize("key", ["orbit", "transfer", "ballistic", "lifting"])
+@pytest.mark.parametrize("key", ["orbit", *(pytest.param(key, marks=pytest.mark.slow) for key in OTHERS)])
 def test_engine_and_scipy_reach_the_same_millimetre_of_a_flight_in_80_bits(key):
     problem = problems.BY_KEY[key]()
     entrants = [engine.entrant(problem, "DOP853"), scipy_peer.entrant(problem)]
@@ -28,7 +29,10 @@ def test_engine_and_scipy_reach_the_same_millimetre_of_a_flight_in_80_bits(key):
 
 
 @pytest.mark.skipif(not handwritten.compilers(), reason="neither g++ nor clang++ is here")
-@pytest.mark.parametrize(("key", "step", "bound"), [("orbit", 60.0, TEN_MICROMETRES), ("satellite", 0.01, 1e-13)])
+@pytest.mark.parametrize(
+    ("key", "step", "bound"),
+    [("orbit", 60.0, TEN_MICROMETRES), pytest.param("satellite", 0.01, 1e-13, marks=pytest.mark.slow)],
+)
 def test_lanes_written_by_hand_take_the_engines_steps(key, step, bound):
     problem = problems.BY_KEY[key]().shortened(8)
     entrants = [engine.entrant(problem, "RK4", 8, (step,)), *handwritten.entrants(problem, step)]
@@ -38,7 +42,7 @@ def test_lanes_written_by_hand_take_the_engines_steps(key, step, bound):
     told(Contest(problem.title, entrants))
 
 
-@pytest.mark.parametrize("key", ["orbit", "satellite"])
+@pytest.mark.parametrize("key", ["orbit", pytest.param("satellite", marks=pytest.mark.slow)])
 def test_one_case_at_a_time_ends_on_the_same_bits(key):
     problem = problems.BY_KEY[key]().shortened(8)
     alone, together = (engine.kernel_flight(problem, "RK4", 0.1 if key == "satellite" else 60.0, w)() for w in (1, 8))
@@ -59,6 +63,7 @@ def test_the_reference_closes_a_revolution_of_a_point_mass_to_a_nanometre():
     assert abs(end - first)[:3].max() < 1e-9
 
 
+@pytest.mark.slow
 def test_a_day_keeps_energy_and_angular_momentum_to_the_order_of_the_method():
     rough, fine = work_precision.drift("RK4", 60.0), work_precision.drift("RK4", 30.0)
     for coarse, half in zip(rough, fine, strict=True):

@@ -36,7 +36,7 @@ def simulator(tmp_path_factory):
     return python_campaign(tmp_path_factory.mktemp("simulator") / "ball", cases=4)
 
 
-@pytest.mark.parametrize("backend", ["loky", "dask"])
+@pytest.mark.parametrize("backend", ["loky", pytest.param("dask", marks=pytest.mark.slow)])
 def test_files_named_as_libraries_in_the_current_folder_are_not_imported(backend, campaign, tmp_path):
     if backend == "dask":
         pytest.importorskip("distributed")
@@ -50,7 +50,9 @@ def test_no_such_file_is_imported_alone_either(name, backend, campaign, tmp_path
     flown_among([name], tmp_path / "here", campaign, backend)
 
 
-@pytest.mark.parametrize("backend", ["threading", "loky", "dask"])
+@pytest.mark.parametrize(
+    "backend", ["threading", *(pytest.param(name, marks=pytest.mark.slow) for name in ("loky", "dask"))]
+)
 def test_processes_of_a_simulator_import_no_such_file(backend, simulator, tmp_path):
     if backend == "dask":
         pytest.importorskip("distributed")

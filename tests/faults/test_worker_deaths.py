@@ -146,7 +146,9 @@ def parts_of(run):
     return {path.name: path.read_bytes() for path in (run / "cases").iterdir()}
 
 
-@pytest.mark.parametrize(("backend", "cases", "killers"), [("loky", 400, [7, 260]), ("dask", 300, [260])])
+@pytest.mark.parametrize(
+    ("backend", "cases", "killers"), [("loky", 400, [7, 260]), pytest.param("dask", 300, [260], marks=pytest.mark.slow)]
+)
 def test_cases_that_kill_their_worker_are_isolated_and_fly_when_asked_again(
     tmp_path, backend, cases, killers, record_property
 ):
@@ -176,7 +178,7 @@ def test_ten_killing_cases_in_ten_thousand_are_isolated(tmp_path, backend):
     check_isolated(tmp_path, 10_000, [int(case) for case in killers], backend, longest_s=3600.0)
 
 
-@pytest.mark.parametrize("backend", ["loky", "dask"])
+@pytest.mark.parametrize("backend", ["loky", pytest.param("dask", marks=pytest.mark.slow)])
 def test_a_case_that_takes_too_long_and_one_that_eats_its_memory_are_given_up(tmp_path, backend):
     campaign = trapped(tmp_path / "campaign", 200, {33: 2, 150: 3})
     limits = Backend(backend, case_seconds=3.0, memory_mib=2048)

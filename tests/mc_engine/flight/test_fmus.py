@@ -10,6 +10,7 @@ from tests.mc_engine.flight.falling_ball import python_campaign
 
 fmpy = pytest.importorskip("fmpy", reason='the extra "fmu" is missing')
 METRICS = ["fall_time_s", "impact_speed_m_s"]
+FEW = 8  # cases with faults, each of which costs a process
 TAKEN = """
 top_speed_m_s = { variable = "speed", take = "max", description = "largest speed" }
 at_top_s = { variable = "speed", take = "time_of_max", unit = "s", description = "time of it" }
@@ -25,8 +26,15 @@ def ball(tmp_path_factory):
     return run(load_campaign(python_campaign(folder / "ball", cases=20)), folder / "run", workers=1).cases()
 
 
-@pytest.mark.parametrize("interface", ["co-simulation", "model-exchange"])
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(
+    ("fmi", "interface"),
+    [
+        (2, "model-exchange"),
+        (3, "co-simulation"),
+        pytest.param(2, "co-simulation", marks=pytest.mark.slow),
+        pytest.param(3, "model-exchange", marks=pytest.mark.slow),
+    ],
+)
 def test_every_kind_of_fmu_flies_the_ball(tmp_path, ball, fmi, interface):
     options = f'interface = "{interface}"\nsolver_tolerance = 1e-9'
     file = fmu_campaign(tmp_path / "ball", cases=20, fmi=fmi, options=options, metrics=TAKEN)
@@ -65,13 +73,13 @@ def test_a_case_of_an_fmu_does_not_depend_on_those_before(tmp_path):
     ids=["segfault", "error", "endless", "NaN"],
 )
 def test_a_fault_of_an_fmu_costs_its_case(tmp_path, ball, fault, status, reason):
-    file = fmu_campaign(tmp_path / "ball", cases=20, fault=fault, options="time_limit_s = 1.0")
+    file = fmu_campaign(tmp_path / "ball", cases=FEW, fault=fault, options="time_limit_s = 1.0")
     table = run(load_campaign(file), tmp_path / "run", workers=2).cases()
     heavy = (table["mass_kg"] > 10.3).to_numpy()
-    assert 0 < heavy.sum() < 10
+    assert 0 < heavy.sum() < FEW
     assert set(table["status"][heavy]) == {status}
     assert all(reason in one for one in table["reason"][heavy])
-    assert np.allclose(table[METRICS][~heavy], ball[METRICS][~heavy], rtol=1e-14, atol=0.0)
+    assert np.allclose(table[METRICS][~heavy], ball[METRICS][:FEW][~heavy], rtol=1e-14, atol=0.0)
 
 
 MISTAKES = {

@@ -231,7 +231,11 @@ def test_a_model_that_kills_its_process_is_a_sentence_unless_only_the_file_is_re
     assert check(tmp_path, "--no-model").returncode == 0
 
 
-@pytest.mark.parametrize("name", [campaign.name for campaign in list_campaigns()])
+NAMES = [campaign.name for campaign in list_campaigns()]
+OTHERS = [pytest.param(name, marks=pytest.mark.slow) for name in NAMES if "/" in name]  # of the same models
+
+
+@pytest.mark.parametrize("name", [*(name for name in NAMES if "/" not in name), *OTHERS])
 def test_shipped_campaigns_keep_the_contract(name):
     campaign = load_campaign(name)
     assert breaches(campaign) == []
