@@ -39,6 +39,12 @@ def limit_s():
     return max(SENTENCE_S, 6.0 * seconds(lambda: tomllib.loads("x = [" + filled("-1,") + "]")))
 
 
+@pytest.fixture(scope="module", autouse=True)
+def imported():
+    """The model is imported once, and not on the clock."""
+    load_campaign("deorbit")
+
+
 def refused(text, directory=None):
     """The sentences about a campaign text, which must come soon."""
     sentences = []
@@ -48,7 +54,6 @@ def refused(text, directory=None):
             load_campaign("x.toml", text=text, directory=directory)
         sentences.append(str(caught.value))
 
-    load_campaign("deorbit")  # the model is imported once, and not on the clock
     gc.freeze()  # what other tests have left in this process is not searched for waste on the clock
     duration = seconds(load)
     gc.unfreeze()

@@ -16,7 +16,7 @@ import pytest
 from figure_marks import FORMS, classes
 
 from mc_engine.campaign.loading import load_campaign
-from mc_engine.campaign.search import find_campaign, list_campaigns
+from mc_engine.campaign.search import find_campaign
 from mc_engine.runner.runner import run
 from mc_engine.statistics import CHOSEN_DESIGNS
 from reports import render_html, render_pdf
@@ -26,6 +26,7 @@ from reports.formats.json_data import render_json, schema
 from reports.formats.markdown import code, render_markdown
 from reports.text.markdown_text import escaped
 from reports.text.numbers import words
+from tests.shipped_campaigns import samples
 
 QUICK = ("reentry", "minimal")  # of which pages are drawn always
 CASES = 60
@@ -39,11 +40,11 @@ COUNTS = (
 EVERY_CASE = re.compile(r"all cases are inside (all limits|the limits? of [^.]*)\.")
 
 
-FLYABLE = [one.name for one in list_campaigns() if "tuning" not in tomllib.loads(one.path.read_text())]
+FLYABLE = samples(tunings=False)
 every_campaign = pytest.mark.parametrize("reported", FLYABLE, indirect=True, scope="module")
 quick_campaigns = pytest.mark.parametrize(
     "reported",
-    [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in FLYABLE],
+    [pytest.param(*each.values, marks=[] if each.values[0] in QUICK else pytest.mark.slow) for each in FLYABLE],
     indirect=True,
     scope="module",
 )

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from mc_engine.campaign.loading import load_campaign
-from mc_engine.campaign.search import list_campaigns
 from mc_engine.errors import CampaignError
 from mc_engine.flight import contract_flight, repeatability
 from mc_engine.flight.contract import breaches
@@ -20,6 +19,7 @@ from mc_engine.flight.interpreted import InterpretedFlight
 from mc_engine.flight.kernel_parts import watching_events
 from tests.mc_engine.model.mistaken_campaign import campaign_with, given, in_front, line_of, with_evaluate
 from tests.mc_engine.store.small_run import ENVIRONMENT
+from tests.shipped_campaigns import samples
 
 
 def only(sentences):
@@ -231,11 +231,7 @@ def test_a_model_that_kills_its_process_is_a_sentence_unless_only_the_file_is_re
     assert check(tmp_path, "--no-model").returncode == 0
 
 
-NAMES = [campaign.name for campaign in list_campaigns()]
-OTHERS = [pytest.param(name, marks=pytest.mark.slow) for name in NAMES if "/" in name]  # of the same models
-
-
-@pytest.mark.parametrize("name", [*(name for name in NAMES if "/" not in name), *OTHERS])
+@pytest.mark.parametrize("name", samples())
 def test_shipped_campaigns_keep_the_contract(name):
     campaign = load_campaign(name)
     assert breaches(campaign) == []

@@ -66,7 +66,7 @@ def assemblies():
 
 
 @pytest.mark.skipif(ptxas() is None, reason="ptxas is not installed: pip install nvidia-cuda-nvcc-cu12")
-@pytest.mark.parametrize(("name", "capability"), assemblies())
+@pytest.mark.parametrize(("name", "capability"), [*assemblies()])
 def test_the_code_assembles(name, capability):
     _, code = code_of(name)
     assert 0 < assembled(ptx_of(code, capability), capability).registers <= 255
