@@ -98,6 +98,27 @@ def replace(record, /, **fields):
     return record._replace(**fields)
 
 
+def merged(made, /, *records, **fields):
+    """The record of the class `made` with the fields given by name, and the others from the records that have them.
+
+    made : class of a named tuple, such as in merged(Outputs, ground, place, speed=v).  ModelError for a field that the
+    class does not have, that is in none of the records, or in two of them.
+    """
+    for name in fields:
+        if name not in made._fields:
+            raise ModelError(f'{made.__name__}(...) has no field "{name}"{hint(name, made._fields)}')
+    return made(*(fields[name] if name in fields else _only(made, name, records) for name in made._fields))
+
+
+def _only(made, name, records):
+    """The field of the one record that has it."""
+    found = [record for record in records if name in record._fields]
+    if len(found) != 1:
+        where_from = "no record has" if not found else f"{len(found)} records have"
+        raise ModelError(f'merged({made.__name__}, ...): {where_from} the field "{name}"; give it by name')
+    return getattr(found[0], name)
+
+
 @taking_numbers
 def two_to(n):
     """2**n for a whole number -1022 <= n <= 1023, given as a float."""

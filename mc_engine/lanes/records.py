@@ -3,8 +3,8 @@
 A named tuple that holds plain numbers in one place and lanes in another is one type: physics may return
 `State(s.v, 0.0)` in one branch and `State(s.v, s.x)` in the other, or begin a loop with a record of plain numbers.
 
-A field that is left out has the default of its class, as in Python.  A field may be a record itself; `replace` and
-`where` are here for records.
+A field that is left out has the default of its class, as in Python.  A field may be a record itself; `replace`,
+`merged` and `where` are here for records.
 
 Compiled code reads the attributes of classes and of `SimpleNamespace` as constants, as it does those of modules.
 """
@@ -104,6 +104,44 @@ def _lower_replace(context, builder, sig, args):
     fields = [
         given[name] if name in given else builder.extract_value(args[0], i) for i, name in enumerate(sig.args[0].fields)
     ]
+    return context.make_tuple(builder, sig.return_type, fields)
+
+
+@infer_global(functions.merged)
+class _Merged(AbstractTemplate):
+    key = functions.merged
+
+    def generic(self, args, kws):
+        made, records = getattr(args[0], "instance_class", None) if args else None, args[1:]
+        if made is None or not all(isinstance(record, types.BaseNamedTuple) for record in records):
+            return None
+        fields = []
+        for name in made._fields:
+            found = [record[record.fields.index(name)] for record in records if name in record.fields]
+            if name not in kws and len(found) != 1:
+                return None
+            fields.append(kws[name] if name in kws else found[0])
+        if not set(kws) <= set(made._fields):
+            return None
+        places = [f"_{i}" for i in range(len(args))]
+        named = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in (*places, *kws)]
+        result = types.BaseTuple.from_types(fields, made)
+        return signature(result, *args, *kws.values()).replace(pysig=inspect.Signature(named))
+
+
+@lower_builtin(functions.merged, types.NamedTupleClass, types.VarArg(types.Any))
+def _lower_merged(context, builder, sig, args):
+    given = dict(zip(sig.pysig.parameters, args, strict=True))
+    records = [(ty, value) for ty, value in zip(sig.args, args, strict=True) if isinstance(ty, types.BaseNamedTuple)]
+
+    def field(name):
+        if name in given:
+            return given[name]
+        return next(
+            builder.extract_value(value, ty.fields.index(name)) for ty, value in records if name in ty.fields
+        )
+
+    fields = [field(name) for name in sig.return_type.fields]
     return context.make_tuple(builder, sig.return_type, fields)
 
 

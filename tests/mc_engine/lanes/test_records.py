@@ -8,7 +8,7 @@ from compiled_physics import by_every_width
 from flown_models import FOLDER, flown, same_bytes
 
 from mc_engine.errors import ModelError
-from mc_engine.lanes import physics, replace, where
+from mc_engine.lanes import merged, physics, replace, where
 from mc_engine.model import load_model
 
 
@@ -20,6 +20,10 @@ class Pair(NamedTuple):
 class Both(NamedTuple):
     pair: Pair = Pair()
     c: float = -1.0
+
+
+class Single(NamedTuple):
+    a: float = 1.0
 
 
 @physics
@@ -35,7 +39,14 @@ def chosen(x, y):
     return both.pair.a, both.pair.b, both.c, plain.a
 
 
-@pytest.mark.parametrize("function", [replaced, chosen])
+@physics
+def made_of_others(x, y):
+    both = merged(Both, Single(a=x), pair=Pair(a=y), c=-x)
+    again = merged(Pair, Single(a=y), both, b=both.c)
+    return both.pair.a, both.c, again.a, merged(Pair, again, b=1.0).b + 0.0 * x
+
+
+@pytest.mark.parametrize("function", [replaced, chosen, made_of_others])
 def test_kernels_of_every_width_make_records_as_python_does(function):
     x, y = np.random.default_rng(1).normal(size=(2, 50))
     x[3] = np.nan
@@ -47,6 +58,20 @@ def test_kernels_of_every_width_make_records_as_python_does(function):
 def test_a_field_that_the_record_has_not_is_refused():
     with pytest.raises(ModelError, match=r'Pair\(...\) has no field "bb"; did you mean "b"?'):
         replace(Pair(), bb=1.0)
+
+
+@pytest.mark.parametrize(
+    ("records", "fields", "sentence"),
+    [
+        ((Single(),), {}, 'merged(Pair, ...): no record has the field "b"; give it by name'),
+        ((Single(), Pair()), {}, 'merged(Pair, ...): 2 records have the field "a"; give it by name'),
+        ((Pair(),), {"aa": 1.0}, 'Pair(...) has no field "aa"; did you mean "a"?'),
+    ],
+)
+def test_a_field_that_is_not_in_exactly_one_record_is_refused(records, fields, sentence):
+    with pytest.raises(ModelError) as error:
+        merged(Pair, *records, **fields)
+    assert str(error.value) == sentence
 
 
 @pytest.mark.parametrize("other", [1.0, Both(), (2.0, 3.0)])
