@@ -34,10 +34,13 @@ SHORTEST_BURN = 1e-6  # s
 
 # velocity change that is commanded [m/s]; thrust [N] outward, ahead and to the normal
 Burn = namedtuple("Burn", "dv outward ahead across")
-# time [s], longitude deviations [rad], drift [rad/rev], e, inclination [rad] and the longitude deviation's integral at
-# the end of the last phasing burn; mean and change of the longitude deviation [rad] in the sidereal day after
-TransferEnd = namedtuple("TransferEnd", "time true mean drift e inclination sum day_mean day_drift")
-NO_END = TransferEnd(*[float("nan")] * 9)
+# at the end of the last phasing burn, by the names of the outputs and metrics; with the longitude deviation's integral
+TransferEnd = namedtuple(
+    "TransferEnd",
+    "transfer_time longitude_deviation mean_longitude_deviation drift_rate eccentricity inclination longitude_sum "
+    "daily_mean_longitude_deviation actual_drift_rate",
+    defaults=[float("nan")] * 9,
+)
 
 
 class Memory(NamedTuple):
@@ -49,7 +52,7 @@ class Memory(NamedTuple):
     burn: Burn = Burn(0.0, 0.0, 0.0, 0.0)
     settled: float = 0.0  # 1 once the inspection counts as settled
     second: float = 0.0  # 1 between two burns that make a pair
-    end: TransferEnd = NO_END
+    end: TransferEnd = TransferEnd()
     estimate: Estimate = NO_ESTIMATE
     after: Error = EXACT  # of the single fix that follows the next burn
     d1: float = 0.0  # fresh normal deviates for that burn
@@ -104,15 +107,14 @@ def drift_of(a):
 def ended(t, s, p):
     """The `TransferEnd` [s, rad, rad/rev] of a transfer that ends here; the day after is still to come."""
     true, mean, x = longitudes(t, s, p)
-    return replace(
-        NO_END,
-        time=t,
-        true=true,
-        mean=mean,
-        drift=drift_of(x.a),
-        e=sqrt(x.k * x.k + x.h * x.h),
+    return TransferEnd(
+        transfer_time=t,
+        longitude_deviation=true,
+        mean_longitude_deviation=mean,
+        drift_rate=drift_of(x.a),
+        eccentricity=sqrt(x.k * x.k + x.h * x.h),
         inclination=2.0 * atan(sqrt(x.q * x.q + x.p * x.p)),
-        sum=s.longitude_sum,
+        longitude_sum=s.longitude_sum,
     )
 
 
@@ -159,11 +161,10 @@ def ignited(t, s, m, p, o):
 
     Duration by the rocket equation, m c (1 - exp(-|dv|/c)) / F; the errors stretch the thrust and tilt it.
     """
-    dv = (
-        phasing_change(t, s, m, p, o)
-        if o.phase == CHOICES.phase.phasing
-        else velocity_change(relative_orbit(s, m.estimate), 1.0 - m.second, p, o)
-    )
+    if o.phase == CHOICES.phase.phasing:
+        dv = phasing_change(t, s, m, p, o)
+    else:
+        dv = velocity_change(relative_orbit(s, m.estimate), 1.0 - m.second, p, o)
     length = s.mass_left * p.exhaust / o.thrust * (1.0 - exp(-abs(dv) / p.exhaust))
     error, radial, normal = execution(m, p, o)
     push = o.thrust * (1.0 + error)
@@ -206,8 +207,10 @@ def next_correction(t, s, m, p, o):
 def day_later(t, s, m, p):
     """The memory a sidereal day after the last phasing burn."""
     _, mean, _ = longitudes(t, s, p)
-    day_mean = (s.longitude_sum - m.end.sum) / SIDEREAL_DAY
-    return replace(m, due=NEVER, mode=NOTHING, end=replace(m.end, day_mean=day_mean, day_drift=mean - m.end.mean))
+    day_mean = (s.longitude_sum - m.end.longitude_sum) / SIDEREAL_DAY
+    day_drift = mean - m.end.mean_longitude_deviation
+    end = replace(m.end, daily_mean_longitude_deviation=day_mean, actual_drift_rate=day_drift)
+    return replace(m, due=NEVER, mode=NOTHING, end=end)
 
 
 @physics
@@ -218,8 +221,7 @@ def decided(t, s, m, cut, p, o):
         second = where(cut, 1.0 - m.second, 0.0)
         coast, burns = where(second > 0.5, 0.5, next_pair(x, p, o)), 1.0
     else:
-        coast, burns = next_coast(x, p, o)
-        second = 0.0
+        (coast, burns), second = next_coast(x, p, o), 0.0
     return replace(m, due=t + SIDEREAL_DAY * coast, mode=where(burns > 0.5, IGNITION, DECISION), second=second)
 
 

@@ -1,4 +1,4 @@
-"""Angular motion near a geostationary place to first order, and first approximations of a phasing.  NumPy.
+"""Angular motion near a geostationary place to first order, first approximations of a phasing, feedback.  NumPy.
 
 Longitudes in the unit of the drift, drift per revolution (sidereal day), east positive; times in revolutions unless a
 name says otherwise.  Numbers in brackets are equations of the source (`model.SOURCE`).
@@ -62,3 +62,29 @@ def fastest(y, v, last, shortest):
     after = y + v * first, v + u1
     u, rest = braking(*after, last, t[1:]) if len(t) > 2 else (np.array([-after[1]]), t[1:])
     return np.concatenate([[u1], u]), np.concatenate([t[:1], rest])
+
+
+def best_corrections(a, b, weight, terminal, sigma):
+    """(gains [n, 2], matrices [n + 1, 2, 2] of the cost to go from each step and at the end) of u_k = -gains[k] x_k.
+
+    Bellman's recursion, equations (3.25)-(3.30), where they are destroyed; their remains in (3.53)-(3.57) agree.  For
+    x_{k+1} = A_k x_k + B_k (1 + mu_k) u_k, mu_k independent, of mean zero and 1-sigma `sigma`: least mean of
+    sum(w u^2) + x_end' L x_end.  a : float64[n, 2, 2];  b : float64[n, 2];  weight : w;  terminal : L
+    """
+    gains, costs = np.zeros((len(a), 2)), np.array([terminal] * (len(a) + 1))
+    for k in reversed(range(len(a))):
+        pull = costs[k + 1] @ b[k]
+        size = weight + (1.0 + sigma**2) * b[k] @ pull
+        gains[k] = a[k].T @ pull / size
+        costs[k] = a[k].T @ costs[k + 1] @ a[k] - size * np.outer(gains[k], gains[k])
+    return gains, costs
+
+
+def planned_cost(b, costs, u, sigma) -> float:
+    """Mean cost, in the unit of `costs`, that the execution errors of planned corrections leave if later ones answer.
+
+    u : float64[n], the corrections.
+
+    Derived here from the recursion: correction k adds the variance (sigma u_k)^2 along b_k, which costs_{k+1} weighs.
+    """
+    return float(sum(sigma**2 * u[k] ** 2 * b[k] @ costs[k + 1] @ b[k] for k in range(len(u))))

@@ -8,7 +8,7 @@ from typing import Any
 
 from campaigns.geo_servicing import plan_table
 from campaigns.geo_servicing.inputs import CHOICES
-from mc_engine.lanes import any_lane, atan2, physics, sincos, sqrt
+from mc_engine.lanes import any_lane, atan2, merged, physics, sincos
 from mc_engine.model import states
 from mc_engine.physics.frames import half_turn, orbital_axes, turned
 from mc_engine.physics.geopotential import MU_EGM2008, RADIUS_EGM2008, harmonics
@@ -16,6 +16,7 @@ from mc_engine.physics.gravity import point_mass
 from mc_engine.physics.orbital_elements import equinoctial
 from mc_engine.physics.radiation import solar_pressure
 from mc_engine.physics.sun_moon import MU_MOON, MU_SUN, ephemeris, third_body
+from mc_engine.physics.vectors import Matrix, Vector, added, norm, transposed_times
 
 MU = MU_EGM2008
 SIDEREAL_DAY = 86_164.0905  # s
@@ -42,44 +43,37 @@ def tolerances(place: float, velocity: float) -> Any:
 @physics
 def initial(p):
     """State at the epoch."""
-    return State(
-        x=p.x, y=p.y, z=p.z, vx=p.vx, vy=p.vy, vz=p.vz, mass_left=p.mass_left,
-        target_x=p.target_x, target_y=p.target_y, target_z=p.target_z,
-        target_vx=p.target_vx, target_vy=p.target_vy, target_vz=p.target_vz, longitude_sum=0.0,
-    )  # fmt: skip
+    return merged(State, p, longitude_sum=0.0)
 
 
 @physics
-def field(t, x, y, z, sun, moon, per_mass, p, o):
+def field(t, r, sun, moon, per_mass, p, o):
     """Acceleration [m/s^2] of a satellite by all but its thrust.
 
-    sun, moon : places [m];  per_mass : C_R A/m [m^2/kg]
+    r, sun, moon : places [m];  per_mass : C_R A/m [m^2/kg]
     """
-    gx, gy, gz = point_mass(x, y, z, MU)
+    g = Vector(*point_mass(r.x, r.y, r.z, MU))
     if o.gravity_degree > 1.0:
         sine, cosine = sincos(p.sidereal + RATE * t)
-        bx, by = turned(x, y, cosine, sine)
+        bx, by = turned(r.x, r.y, cosine, sine)
         hx, hy, hz = harmonics(
-            bx, by, z, MU, RADIUS_EGM2008, o.gravity_degree, o.gravity_order, o.tables, plan_table.LENGTH
+            bx, by, r.z, MU, RADIUS_EGM2008, o.gravity_degree, o.gravity_order, o.tables, plan_table.LENGTH
         )
         hx, hy = turned(hx, hy, cosine, -sine)
-        gx, gy, gz = gx + hx, gy + hy, gz + hz
+        g = added(g, Vector(hx, hy, hz))
     if o.sun_and_moon > 0.5:
-        ax, ay, az = third_body(x, y, z, sun[0], sun[1], sun[2], MU_SUN)
-        bx, by, bz = third_body(x, y, z, moon[0], moon[1], moon[2], MU_MOON)
-        gx, gy, gz = gx + ax + bx, gy + ay + by, gz + az + bz
+        g = added(g, Vector(*third_body(r.x, r.y, r.z, sun.x, sun.y, sun.z, MU_SUN)))
+        g = added(g, Vector(*third_body(r.x, r.y, r.z, moon.x, moon.y, moon.z, MU_MOON)))
     if o.sunlight > 0.5:
-        ax, ay, az = solar_pressure(x, y, z, sun[0], sun[1], sun[2], per_mass, 1.0)
-        gx, gy, gz = gx + ax, gy + ay, gz + az
-    return gx, gy, gz
+        g = added(g, Vector(*solar_pressure(r.x, r.y, r.z, sun.x, sun.y, sun.z, per_mass, 1.0)))
+    return g
 
 
 @physics
 def longitudes(t, s, p):
     """(true, mean) longitude of the servicing module less the required one [rad], in [-pi, pi]; and its elements."""
     elements = equinoctial(s.x, s.y, s.z, s.vx, s.vy, s.vz, MU)
-    mean = elements.mean - (p.aim + RATE * t)
-    return true_deviation(t, s, p), half_turn(mean), elements
+    return true_deviation(t, s, p), half_turn(elements.mean - (p.aim + RATE * t)), elements
 
 
 @physics
@@ -91,39 +85,27 @@ def true_deviation(t, s, p):
 
 
 @physics
-def thrust(s, m):
-    """Acceleration [m/s^2] by the thrust that the memory holds."""
-    rx, ry, rz, sx, sy, sz, nx, ny, nz = orbital_axes(s.x, s.y, s.z, s.vx, s.vy, s.vz)
-    a, b, c = m.burn.outward / s.mass_left, m.burn.ahead / s.mass_left, m.burn.across / s.mass_left
-    return a * rx + b * sx + c * nx, a * ry + b * sy + c * ny, a * rz + b * sz + c * nz
-
-
-@physics
 def rhs(t, s, m, p, o):
     """Time derivative of the state, SI, inertial axes: gravity, Sun and Moon, light, thrust, and mass flow F / c."""
-    sx, sy, sz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    sun, moon = Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
     if o.sun_and_moon + o.sunlight > 0.5:
         sx, sy, sz, mx, my, mz = ephemeris(p.sun_moon_time + t, o.tables, p.sun_moon)
-    sun, moon = (sx, sy, sz), (mx, my, mz)
-    ax, ay, az = field(t, s.x, s.y, s.z, sun, moon, p.light / s.mass_left, p, o)
-    flow = 0.0
+        sun, moon = Vector(sx, sy, sz), Vector(mx, my, mz)
+    a = field(t, Vector(s.x, s.y, s.z), sun, moon, p.light / s.mass_left, p, o)
+    flow, away = 0.0, 0.0
     if any_lane(abs(m.burn.ahead) > 0.0):
-        fx, fy, fz = thrust(s, m)
-        ax, ay, az = ax + fx, ay + fy, az + fz
-        flow = -push(m.burn) / p.exhaust
-    ux, uy, uz, bx, by, bz, away = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        push = Vector(m.burn.outward, m.burn.ahead, m.burn.across)
+        by_mass = Vector(push.x / s.mass_left, push.y / s.mass_left, push.z / s.mass_left)
+        a = added(a, transposed_times(Matrix(*orbital_axes(s.x, s.y, s.z, s.vx, s.vy, s.vz)), by_mass))
+        flow = -norm(push) / p.exhaust
+    target_v, target_a = Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
     if o.phase == CHOICES.phase.inspection:
-        bx, by, bz = field(t, s.target_x, s.target_y, s.target_z, sun, moon, p.target_light, p, o)
-        ux, uy, uz = s.target_vx, s.target_vy, s.target_vz
+        target_v = Vector(s.target_vx, s.target_vy, s.target_vz)
+        target_a = field(t, Vector(s.target_x, s.target_y, s.target_z), sun, moon, p.target_light, p, o)
     else:
         away = true_deviation(t, s, p)
     return State(
-        x=s.vx, y=s.vy, z=s.vz, vx=ax, vy=ay, vz=az, mass_left=flow,
-        target_x=ux, target_y=uy, target_z=uz, target_vx=bx, target_vy=by, target_vz=bz, longitude_sum=away,
+        x=s.vx, y=s.vy, z=s.vz, vx=a.x, vy=a.y, vz=a.z, mass_left=flow,
+        target_x=target_v.x, target_y=target_v.y, target_z=target_v.z,
+        target_vx=target_a.x, target_vy=target_a.y, target_vz=target_a.z, longitude_sum=away,
     )  # fmt: skip
-
-
-@physics
-def push(burn):
-    """Size of the thrust [N]."""
-    return sqrt(burn.outward * burn.outward + burn.ahead * burn.ahead + burn.across * burn.across)

@@ -30,13 +30,10 @@ _DAY = 86_400.0
 
 
 def prepare(i: SimpleNamespace, o: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
-    """Kernel parameters of each case.
-
-    i : inputs, float64[n] by symbol, SI;  o : settings, codes, float64[n], by symbol.  Refused cases join `refusals`.
-    """
+    """Kernel parameters of each case, SI; i : inputs;  o : settings, codes."""
     epoch = o.epoch_utc + i.epoch_error / _DAY
     sidereal = sidereal_angle(epoch)
-    two = o.phase == CHOICES.phase.inspection
+    two, around = o.phase == CHOICES.phase.inspection, o.geometry == CHOICES.geometry.around
     refusals.add(o.gravity_order > o.gravity_degree, "gravity_order is above gravity_degree")
     refusals.add(o.gravity_degree == 1.0, "the geopotential has no harmonics of degree 1; take 0, or 2 and above")
     mass = o.mass + i.mass_error
@@ -60,7 +57,10 @@ def prepare(i: SimpleNamespace, o: SimpleNamespace, refusals: Refusals) -> dict[
         # in the inspection both craft's fixes count, in the phasing there is one
         "nav_position": np.hypot(i.nav_position, np.where(two, i.target_nav_position, 0.0)),
         "nav_velocity": np.hypot(i.nav_velocity, np.where(two, i.target_nav_velocity, 0.0)),
-        **_inspection_rows(i, o),
+        "nominal": np.where(around, 0.0, np.where(o.geometry == CHOICES.geometry.behind, -1.0, 1.0)) * i.standoff,
+        # the relative ellipse has the half axes R0 e outward and 2 R0 e ahead: it is between the ranges wanted if the
+        # difference of the eccentricities is between low/R0 and high/(2 R0), and in the middle of that here
+        "around": np.where(around, 0.5 * (i.around_low / R0 + i.around_high / (2.0 * R0)), 0.0),
         **_sun_moon_rows(epoch, o),
     }
 
@@ -82,28 +82,10 @@ def phasing_start(i: SimpleNamespace, o: SimpleNamespace, sidereal, refusals: Re
 
 def craft_start(i: SimpleNamespace, name: str) -> np.ndarray:
     """State float64[6, n], SI, inertial axes, of the craft whose parameters begin with `name`."""
-    own = SimpleNamespace(**{key.removeprefix(f"{name}_"): value for key, value in vars(i).items()})
-    return state_of_elements(
-        own.pericentre_radius / (1.0 - own.eccentricity),
-        own.eccentricity,
-        own.inclination,
-        own.node,
-        own.argument_of_pericentre,
-        own.argument_of_latitude - own.argument_of_pericentre,
-        MU,
-    )
-
-
-def _inspection_rows(i: SimpleNamespace, o: SimpleNamespace) -> dict[str, np.ndarray]:
-    """The law's parameters, SI; `around` is the difference of eccentricities that a fly-around keeps.
-
-    The relative ellipse has the half axes R0 e outward and 2 R0 e ahead: it is between the ranges wanted if e is
-    between low/R0 and high/(2 R0), and in the middle of that here.
-    """
-    around = o.geometry == CHOICES.geometry.around
-    middle = 0.5 * (i.around_low / R0 + i.around_high / (2.0 * R0))
-    side = np.where(around, 0.0, np.where(o.geometry == CHOICES.geometry.behind, -1.0, 1.0))
-    return {"nominal": side * i.standoff, "around": np.where(around, middle, 0.0)}
+    parts = ("pericentre_radius", "eccentricity", "inclination", "node", "argument_of_pericentre")
+    radius, e, inclination, node, pericentre = (getattr(i, f"{name}_{part}") for part in parts)
+    anomaly = getattr(i, f"{name}_argument_of_latitude") - pericentre
+    return state_of_elements(radius / (1.0 - e), e, inclination, node, pericentre, anomaly, MU)
 
 
 def _sun_moon_rows(epoch: np.ndarray, o: SimpleNamespace) -> dict[str, np.ndarray]:
@@ -121,13 +103,16 @@ def _sun_moon_rows(epoch: np.ndarray, o: SimpleNamespace) -> dict[str, np.ndarra
     }
 
 
+Parameters = prepared(prepare, Inputs)
+
+
 def tables(o: Any) -> np.ndarray:
     """The phasing plan and the harmonics of the geopotential, for the settings o."""
     plan = kept_design(plan_of, *nominal_start(o)) if o.phase == CHOICES.phase.phasing else np.zeros(plan_table.LENGTH)
     return np.concatenate([plan, harmonics_table(int(o.gravity_degree), int(o.gravity_order)).ravel()])
 
 
-def nominal_start(o: Any) -> tuple[Any, SimpleNamespace]:
+def nominal_start(o: Any) -> tuple[Any, Any]:
     """(settings with the tables of a flight without a plan, kernel parameters, SI) of the case without errors."""
     defaults = [item for item in Inputs.declared if isinstance(item, Parameter)]
     inputs = SimpleNamespace(**{item.symbol: np.array([item.default * item.si_factor]) for item in defaults})
@@ -140,8 +125,7 @@ def nominal_start(o: Any) -> tuple[Any, SimpleNamespace]:
         raise ModelError(f"there is no plan: {refusals.reason[0]}")
     # no plan yet, as in the tables of a free flight: for the phasing `tables` would ask for the plan itself
     unplanned = np.concatenate([tables(o._replace(phase=CHOICES.phase.free)), columns.pop("tables").ravel()])
-    first = {name: float(np.ravel(row)[0]) for name, row in columns.items()}
-    return o._replace(tables=unplanned), SimpleNamespace(**first)
+    return o._replace(tables=unplanned), Parameters(**{name: float(np.ravel(row)[0]) for name, row in columns.items()})
 
 
 def sample_period(o: Any) -> float:
@@ -173,7 +157,7 @@ MODEL = model(
     outputs=outcome.Outputs,
     metrics=outcome.Metrics,
     clock=AdaptiveStep("duration", "tolerance", dynamics.tolerances(1e-4, 1e-8), control_period=sample_period),
-    kernel_parameters=prepared(prepare, Inputs),
+    kernel_parameters=Parameters,
     prepare=prepare,
     initial=dynamics.initial,
     start=corrections.start,

@@ -19,6 +19,7 @@ from mc_engine.lanes import physics, replace, sincos, where
 from mc_engine.lanes.noise import normal_pair
 from mc_engine.physics.frames import orbital_axes
 from mc_engine.physics.orbital_elements import equinoctial
+from mc_engine.physics.vectors import Matrix, Vector, added_scaled
 
 Error = namedtuple("Error", "r s u w")
 EXACT = Error(0.0, 0.0, 0.0, 0.0)
@@ -146,13 +147,8 @@ def navigated_elements(s, e):
 
     r, u : outward;  s, w : ahead.
     """
-    rx, ry, rz, ax, ay, az, _, _, _ = orbital_axes(s.x, s.y, s.z, s.vx, s.vy, s.vz)
-    return equinoctial(
-        s.x + e.r * rx + e.s * ax,
-        s.y + e.r * ry + e.s * ay,
-        s.z + e.r * rz + e.s * az,
-        s.vx + e.u * rx + e.w * ax,
-        s.vy + e.u * ry + e.w * ay,
-        s.vz + e.u * rz + e.w * az,
-        MU,
-    )
+    axes = Matrix(*orbital_axes(s.x, s.y, s.z, s.vx, s.vy, s.vz))
+    outward, ahead = Vector(axes.xx, axes.xy, axes.xz), Vector(axes.yx, axes.yy, axes.yz)
+    r = added_scaled(added_scaled(Vector(s.x, s.y, s.z), e.r, outward), e.s, ahead)
+    v = added_scaled(added_scaled(Vector(s.vx, s.vy, s.vz), e.u, outward), e.w, ahead)
+    return equinoctial(r.x, r.y, r.z, v.x, v.y, v.z, MU)

@@ -8,9 +8,10 @@ from campaigns.geo_servicing.dynamics import SIDEREAL_DAY
 from campaigns.geo_servicing.inputs import CHOICES
 from campaigns.geo_servicing.inspection import relative_orbit
 from campaigns.geo_servicing.navigation import EXACT
-from mc_engine.lanes import log, physics, sqrt, where
+from mc_engine.lanes import log, merged, physics, replace, where
 from mc_engine.model import Field, at_end, maximum_of, metrics, minimum_of, outputs
 from mc_engine.physics.frames import TURN, orbital_axes
+from mc_engine.physics.vectors import Matrix, Vector, matrix_times, norm, subtracted
 
 FAR = 1e9  # m, a range that is none
 NONE = float("nan")
@@ -79,7 +80,13 @@ EXTREMA = {
     "settled_far": maximum_of("settled_range_m", "largest settled range"),
     "settled_near": maximum_of("settled_nearness_m", "smallest settled range, negative"),
 }
-Pair = namedtuple("Pair", "along radial range drift e")
+# quantities and metrics of the inspection, by their names; what a phase without a target does not have
+Pair = namedtuple("Pair", "along_track radial range relative_drift relative_eccentricity")
+NO_PAIR = Pair(NONE, NONE, 0.0, 0.0, 0.0)
+Inspected = namedtuple(
+    "Inspected", "min_range max_range settled_min_range settled_max_range relative_drift relative_eccentricity steady"
+)
+NOT_INSPECTED = Inspected(*[NONE] * 7)
 
 
 @physics
@@ -92,38 +99,29 @@ def period_error(drift):
 def pair_of(s, o):
     """The module seen from the target [m], in its radial and transverse axes; missing in phases without a target."""
     if o.phase == CHOICES.phase.inspection:
-        rx, ry, rz, ax, ay, az, _, _, _ = orbital_axes(
-            s.target_x, s.target_y, s.target_z, s.target_vx, s.target_vy, s.target_vz
-        )
-        dx, dy, dz = s.x - s.target_x, s.y - s.target_y, s.z - s.target_z
-        along, radial = dx * ax + dy * ay + dz * az, dx * rx + dy * ry + dz * rz
+        r, v = Vector(s.target_x, s.target_y, s.target_z), Vector(s.target_vx, s.target_vy, s.target_vz)
+        away = subtracted(Vector(s.x, s.y, s.z), r)
+        seen = matrix_times(Matrix(*orbital_axes(r.x, r.y, r.z, v.x, v.y, v.z)), away)
         true = relative_orbit(s, EXACT)
-        return Pair(along, radial, sqrt(dx * dx + dy * dy + dz * dz), true.drift, true.e)
-    return Pair(NONE, NONE, 0.0, 0.0, 0.0)
+        return Pair(seen.y, seen.x, norm(away), true.drift, true.e)
+    return NO_PAIR
 
 
 @physics
 def observe(t, s, m, p, o):
     """The quantities, SI and radians."""
     here, pair, settled = ended(t, s, p), pair_of(s, o), m.settled > 0.5
-    return Outputs(
-        longitude_deviation=here.true,
-        mean_longitude_deviation=here.mean,
-        drift_rate=here.drift,
-        period_error=period_error(here.drift),
-        eccentricity=here.e,
-        inclination=here.inclination,
+    return merged(
+        Outputs,
+        here,
+        pair,
+        period_error=period_error(here.drift_rate),
         thrust=m.burn.ahead,
         delta_v=p.exhaust * log(p.mass_left / s.mass_left),
-        along_track=pair.along,
-        radial=pair.radial,
-        range=pair.range,
         settled_range=where(settled, pair.range, 0.0),
         settled_nearness=where(settled, -pair.range, -FAR),
-        settled_along_track=where(settled, pair.along, NONE),
+        settled_along_track=where(settled, pair.along_track, NONE),
         settled_radial=where(settled, pair.radial, NONE),
-        relative_drift=pair.drift,
-        relative_eccentricity=pair.e,
         corrections=m.burns,
     )
 
@@ -131,31 +129,12 @@ def observe(t, s, m, p, o):
 @physics
 def evaluate(t, s, m, p, o, best):
     """The metrics at the end that are no value of a quantity, SI and radians."""
-    end = m.end
+    end, inspected = m.end, NOT_INSPECTED
     if o.phase != CHOICES.phase.phasing:  # no transfer: where the module is at the end of the flight
-        end = ended(t, s, p)
-    near, far, settled_near, settled_far, steady, e, drift = NONE, NONE, NONE, NONE, NONE, NONE, NONE
+        end = replace(ended(t, s, p), transfer_time=NONE)
     if o.phase == CHOICES.phase.inspection:
-        near, far, settled_near, settled_far = best.near, best.far, -best.settled_near, best.settled_far
-        within = (m.settled > 0.5) & (settled_near >= o.range_low) & (settled_far <= o.range_high)
-        true = relative_orbit(s, EXACT)
-        steady, e, drift = where(within, 1.0, 0.0), true.e, true.drift
-    return Metrics(
-        longitude_deviation=end.true,
-        mean_longitude_deviation=end.mean,
-        daily_mean_longitude_deviation=m.end.day_mean,
-        drift_rate=end.drift,
-        actual_drift_rate=m.end.day_drift,
-        period_error=period_error(end.drift),
-        actual_period_error=period_error(m.end.day_drift),
-        eccentricity=end.e,
-        inclination=end.inclination,
-        transfer_time=m.end.time,
-        min_range=near,
-        max_range=far,
-        settled_min_range=settled_near,
-        settled_max_range=settled_far,
-        relative_eccentricity=e,
-        relative_drift=drift,
-        steady=steady,
-    )
+        near, far, true = -best.settled_near, best.settled_far, relative_orbit(s, EXACT)
+        steady = where((m.settled > 0.5) & (near >= o.range_low) & (far <= o.range_high), 1.0, 0.0)
+        inspected = Inspected(best.near, best.far, near, far, true.drift, true.e, steady)
+    period, actual = period_error(end.drift_rate), period_error(end.actual_drift_rate)
+    return merged(Metrics, end, inspected, period_error=period, actual_period_error=actual)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import scipy  # loads its packages when they are used
 
-from campaigns.geo_servicing.bellman import Corrections, best_corrections, planned_cost
-from campaigns.geo_servicing.drift_model import DRIFT_PER_DV, E_PER_DV, after_correction, braking, fastest, largest_last
+from campaigns.geo_servicing import drift_model
+from campaigns.geo_servicing.drift_model import DRIFT_PER_DV, after_correction
 from campaigns.geo_servicing.dynamics import SIDEREAL_DAY
 from campaigns.geo_servicing.inputs import CHOICES
 from campaigns.geo_servicing.plan_table import Row, plan_rows
@@ -38,7 +38,7 @@ def plan_of(o: Any, first: Any) -> np.ndarray:
     craft = Craft(o, first)
     plan = published_plan(craft) if o.schedule == CHOICES.schedule.published else design(craft)
     (ignition, longitude, drift), _ = craft.fly_plan(plan)
-    gains = gains_of(craft, plan, limits_of(o)).gains
+    _, gains, _ = feedback(craft, plan, limits_of(o))
     return plan_rows(Row(ignition, plan.dv, longitude, drift, *gains.T))
 
 
@@ -67,26 +67,24 @@ def modelled(craft: Craft, plan: Plan, lacking: End) -> End:
     e = craft.e
     check = end + 0.5  # the longitude that counts is the mean of the day after
     for dv, now, following in zip(plan.dv, when, [*when[1:], check], strict=True):
-        e = e + E_PER_DV * dv * np.exp(1j * (craft.aim + TURN * now + y))
+        e = e + drift_model.E_PER_DV * dv * np.exp(1j * (craft.aim + TURN * now + y))
         y, v = after_correction(y, v, DRIFT_PER_DV * dv, following - now, *craft.pull)
     # what the drift will be is that of the longitude, which the outward pull joins
     return End(y + lacking.y, v + craft.pull[1] + lacking.v, e + lacking.e, end)
 
 
-def steps(craft: Craft, plan: Plan) -> tuple[np.ndarray, np.ndarray]:
-    """(A, B) of the deviations [rad, rad/rev] from one ignition to the next, and to the check at the end.  (3.46)"""
+def feedback(craft: Craft, plan: Plan, limits: Limits) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(B, gains, costs) for deviations [rad, rad/rev] from one ignition to the next, and to the check at the end.
+
+    (3.46) and (3.25)-(3.30), see `drift_model.best_corrections`; the end counts in thirds of its tolerances.
+    """
     when, end = middles(craft, plan)
     ignition = when - 0.5 * craft.burn_times(plan.dv) / SIDEREAL_DAY
     following = np.append(ignition[1:], end + 0.5)
     a = np.array([[[1.0, t], [0.0, 1.0]] for t in following - ignition])
-    return a, np.column_stack([following - when, np.ones(len(when))])
-
-
-def gains_of(craft: Craft, plan: Plan, limits: Limits) -> Corrections:
-    """Gains for deviations [rad, rad/rev] from the plan, (3.25)-(3.30); the end counts in thirds of its tolerances."""
-    a, b = steps(craft, plan)
-    terminal, none = np.diag([(3.0 / limits.y) ** 2, (3.0 / limits.v) ** 2]), np.zeros((2, 2))
-    return best_corrections(a, b, np.zeros_like(b), none, 1e-6 * terminal[1, 1], terminal, craft.o.assumed_thrust)
+    b = np.column_stack([following - when, np.ones(len(when))])
+    terminal = np.diag([(3.0 / limits.y) ** 2, (3.0 / limits.v) ** 2])
+    return b, *drift_model.best_corrections(a, b, 1e-6 * terminal[1, 1], terminal, craft.o.assumed_thrust)
 
 
 def design(craft: Craft) -> Plan:
@@ -109,7 +107,7 @@ def design(craft: Craft) -> Plan:
 
 def first_approximations(craft: Craft, limits: Limits) -> list[Plan]:
     """Plans to start the search from: the source's profiles at several lengths of the coasts; [s, m/s]."""
-    profile = braking if craft.o.aim == CHOICES.aim.fuel else fastest
+    profile = drift_model.braking if craft.o.aim == CHOICES.aim.fuel else drift_model.fastest
     plans = []
     for longer in (0.0, 0.25, 0.5):
         shortest = limits.coasts.copy()
@@ -127,7 +125,7 @@ def limits_of(o: Any) -> Limits:
     y, v, e = o.longitude_tolerance, TURN * o.period_tolerance / SIDEREAL_DAY, o.eccentricity_tolerance
     coasts = np.full(int(o.planned_corrections), o.least_coast / SIDEREAL_DAY)
     coasts[0] = o.first_coast / SIDEREAL_DAY
-    last = np.radians(largest_last(np.degrees(y), np.degrees(v), e, max(o.assumed_thrust, 1e-6), 0.5))
+    last = np.radians(drift_model.largest_last(np.degrees(y), np.degrees(v), e, max(o.assumed_thrust, 1e-6), 0.5))
     return Limits(y, v, e, coasts, o.longest_transfer / SIDEREAL_DAY, o.largest_last or last)
 
 
@@ -152,9 +150,8 @@ def _improved(craft: Craft, limits: Limits, lacking: End, start: Plan) -> tuple[
     def cost(z):
         """Speed change [m/s] with the spread's share in it; where time is the aim, the time [rev] and 0.02 of that."""
         candidate = plan(z)
-        _, b = steps(craft, candidate)
-        costs = gains_of(craft, candidate, limits).costs
-        spread = planned_cost(b, costs, DRIFT_PER_DV * candidate.dv, craft.o.assumed_thrust)
+        b, _, costs = feedback(craft, candidate, limits)
+        spread = drift_model.planned_cost(b, costs, DRIFT_PER_DV * candidate.dv, craft.o.assumed_thrust)
         spent = (signs * candidate.dv).sum() + DV_OF_COST * spread
         return modelled(craft, candidate, lacking).time + 0.02 * spent if craft.o.aim == CHOICES.aim.time else spent
 

@@ -15,6 +15,7 @@ from campaigns.geo_servicing.drift_model import perturbation_coefficients
 from campaigns.geo_servicing.dynamics import MU, R0, RATE, SIDEREAL_DAY, State
 from mc_engine.physics.gravity import point_mass
 from mc_engine.physics.sun_moon import ephemeris
+from mc_engine.physics.vectors import Vector, subtracted
 
 _TOLERANCES = {"rtol": 1e-9, "atol": dynamics.tolerances(1e-3, 1e-7)}
 
@@ -44,12 +45,11 @@ class Craft:
         """(b_s, b_r) of (3.46), of the perturbations averaged over the first sidereal day at the required longitude."""
         t = np.linspace(0.0, SIDEREAL_DAY, 24, endpoint=False)
         angle = self.aim + RATE * t
-        x, y, z = R0 * np.cos(angle), R0 * np.sin(angle), 0.0 * t
+        r = Vector(R0 * np.cos(angle), R0 * np.sin(angle), 0.0 * t)
         sx, sy, sz, mx, my, mz = ephemeris(self.p.sun_moon_time + t, self.o.tables, self.p.sun_moon)
         light = self.p.light / self.p.mass_left
-        ax, ay, _ = dynamics.field(t, x, y, z, (sx, sy, sz), (mx, my, mz), light, self.p, self.o)
-        px, py, _ = point_mass(x, y, z, MU)
-        ax, ay = ax - px, ay - py
+        a = dynamics.field(t, r, Vector(sx, sy, sz), Vector(mx, my, mz), light, self.p, self.o)
+        ax, ay, _ = subtracted(a, Vector(*point_mass(*r, MU)))
         outward, ahead = ax * np.cos(angle) + ay * np.sin(angle), ay * np.cos(angle) - ax * np.sin(angle)
         return perturbation_coefficients(ahead.mean(), outward.mean())
 

@@ -39,7 +39,7 @@ def angle_at(t, m, period):
 @physics
 def lateral_miss(s, p):
     """Distance [m] to the right of the target at which the plane of the present motion passes it."""
-    right = cross(Vector(s.vx, s.vy, s.vz), Vector(s.x, s.y, s.z))
+    right = cross(Vector(s.vx, s.vy, s.vz), s)
     size = norm(right)
     return -p.radius * dot(right, Vector(p.tx, p.ty, p.tz)) / where(size > 0.0, size, 1.0)
 

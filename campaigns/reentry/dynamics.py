@@ -12,24 +12,20 @@ from campaigns.reentry.bank import angle_at
 from campaigns.reentry.inputs import CHOICES
 from campaigns.reentry.vehicles import apollo_shares
 from campaigns.reentry.weather import weather_at
-from mc_engine.lanes import any_lane, atan2, exp, maximum, physics, replace, sincos, sqrt, where
+from mc_engine.lanes import any_lane, atan2, exp, maximum, merged, physics, replace, sincos, sqrt, where
 from mc_engine.model import states
 from mc_engine.physics.aerodynamics import axial_coefficient, lift_direction
 from mc_engine.physics.frames import over_ellipsoid, velocity_angles
 from mc_engine.physics.gravity import j2_perturbation, point_mass
 from mc_engine.physics.heating import DKR_EXPONENT, detra_kemp_riddell, sutton_graves
-from mc_engine.physics.vectors import Vector, added, added_scaled, cross, dot, norm
+from mc_engine.physics.vectors import Matrix, Vector, added, added_scaled, cross, dot, matrix_times, norm, scaled
 
 NEVER = -1.0  # value of an event that is not looked for
 NAN = float("nan")
 
 State = states(
-    x_m="place, planet-fixed x",
-    y_m="place, planet-fixed y",
-    z_m="place, planet-fixed z",
-    vx_m_s="velocity over ground, planet-fixed x",
-    vy_m_s="velocity over ground, planet-fixed y",
-    vz_m_s="velocity over ground, planet-fixed z",
+    **{f"{axis}_m": f"place, planet-fixed {axis}" for axis in "xyz"},
+    **{f"v{axis}_m_s": f"velocity over ground, planet-fixed {axis}" for axis in "xyz"},
     heat_load_j_m2="convective heat load at the stagnation point",
 )
 # the discrete state: what the flight has met so far, and what the guidance keeps
@@ -37,9 +33,13 @@ Memory = namedtuple("Memory", "met steering")
 # pressed, hottest: the moments of the largest dynamic pressure and heat rate; what has not come is not a number
 Met = namedtuple("Met", "pressed hottest lift exits pull_out first_exit")
 Lift = namedtuple("Lift", "cos_bank sin_bank rolls")  # present direction, and how often it was changed
-PullOut = namedtuple("PullOut", "altitude time", defaults=(NAN, NAN))
-# from the atmosphere: speed and flight-path angle over ground, inertial speed, altitude of the apoapsis
-Exit = namedtuple("Exit", "time speed angle inertial apoapsis", defaults=(NAN, NAN, NAN, NAN, NAN))
+# by the names of the metrics
+PullOut = namedtuple("PullOut", "min_altitude min_altitude_time", defaults=[NAN] * 2)
+Exit = namedtuple(
+    "Exit",
+    "exit_time exit_speed exit_flight_path_angle exit_inertial_speed exit_apoapsis_altitude",
+    defaults=[NAN] * 5,
+)
 Steering = namedtuple(
     "Steering", "turn reckoning side active samples saturated reversals", defaults=(0.0, 0.0, 0.0, 0.0)
 )
@@ -55,15 +55,15 @@ Place = namedtuple("Place", "altitude climb up")  # climb: rate of the altitude;
 Air = namedtuple("Air", "density slope temperature v speed shear")
 # areas over mass [m^2/kg] of drag, lift, total load, load along the body axis and along the accelerometer's
 Force = namedtuple("Force", "drag lift total axial sensed")
-Exposure = namedtuple("Exposure", "place air force pressure flux")  # with dynamic pressure [Pa] and heat rate [W/m^2]
-# a time, and what is there: besides those of `Exposure` altitude, speed over ground, total and axial load [m/s^2]
-Moment = namedtuple("Moment", "time pressure flux altitude speed load axial_load")
+Exposure = namedtuple("Exposure", "place air force dynamic_pressure heat_rate")
+# a time, and outputs there
+Moment = namedtuple("Moment", "time altitude speed load axial_load dynamic_pressure heat_rate")
 
 
 @physics
 def initial(p):
     """State at entry."""
-    return State(x=p.x, y=p.y, z=p.z, vx=p.vx, vy=p.vy, vz=p.vz, heat_load=0.0)
+    return merged(State, p, heat_load=0.0)
 
 
 @physics
@@ -75,11 +75,7 @@ def velocity(s):
 @physics
 def from_planned_entry(s, p):
     """The place [m] along the axes of the planned entry: up, ahead, to the right."""
-    return (
-        s.x * p.ex + s.y * p.ey + s.z * p.ez,
-        s.x * p.fx + s.y * p.fy + s.z * p.fz,
-        s.x * p.nx + s.y * p.ny + s.z * p.nz,
-    )
+    return matrix_times(Matrix(p.ex, p.ey, p.ez, p.fx, p.fy, p.fz, p.nx, p.ny, p.nz), s)
 
 
 @physics
@@ -91,15 +87,15 @@ def place_of(s, p, o):
     if o.shape == CHOICES.shape.flat:
         place = Place(altitude=s.z, climb=s.vz, up=Vector(0.0, 0.0, 1.0))
     else:
-        r2 = s.x * s.x + s.y * s.y + s.z * s.z
+        r2 = dot(s, s)
         inverse2 = 1.0 / r2
         r = sqrt(r2)
         inverse = r * inverse2
         altitude, slope = over_ellipsoid(r, inverse, s.z * s.z * inverse2, p.polar_radius, p.e2)
-        radial = (s.x * s.vx + s.y * s.vy + s.z * s.vz) * inverse
+        radial = dot(s, velocity(s)) * inverse
         # rate of the squared sine of latitude, z^2 / r^2
         climb = radial - slope * (2.0 * s.z * inverse2 * (s.vz - s.z * radial * inverse))
-        place = Place(altitude, climb, up=Vector(s.x * inverse, s.y * inverse, s.z * inverse))
+        place = Place(altitude, climb, up=scaled(inverse, s))
     return place
 
 
@@ -213,7 +209,7 @@ def crossings(t, s, m, p, o):
     return Events(
         pressure_peak=thicker + 2.0 * gain,
         heat_peak=0.5 * thicker + power * gain,
-        pull_out=where(m.met.pull_out.time >= 0.0, NEVER, place.climb),
+        pull_out=where(m.met.pull_out.min_altitude_time >= 0.0, NEVER, place.climb),
         roll=where(rolls == 0.0, sine - p.roll_at, where(rolls == 1.0, p.roll_back_at - sine, NEVER)),
         leave=NEVER if stops else above,
         stop=place.altitude - p.stop_altitude,
@@ -223,17 +219,19 @@ def crossings(t, s, m, p, o):
 
 
 @physics
-def moment_of(t, s, p, o):
-    """The `Moment` of a state, SI."""
-    place, _, force, pressure, flux = exposure_of(s, p, o)
-    load, axial_load = pressure * force.total, pressure * force.axial
-    return Moment(t, pressure, flux, place.altitude, norm(velocity(s)), load, axial_load)
+def moment_of(t, s, exposure):
+    """The `Moment` of a state and its `Exposure`, SI."""
+    load = exposure.dynamic_pressure * exposure.force.total
+    axial_load = exposure.dynamic_pressure * exposure.force.axial
+    speed = norm(velocity(s))
+    return merged(Moment, exposure, exposure.place, time=t, speed=speed, load=load, axial_load=axial_load)
 
 
 @physics
 def start(p, o):
     """The discrete state at entry, SI: peaks begin with the values there."""
-    now, turn = moment_of(0.0, initial(p), p, o), Turn(bank=p.first_bank, next_bank=p.first_bank)
+    s, turn = initial(p), Turn(bank=p.first_bank, next_bank=p.first_bank)
+    now = moment_of(0.0, s, exposure_of(s, p, o))
     met = Met(now, now, Lift(p.cos_bank, p.sin_bank, rolls=0.0), exits=0.0, pull_out=PullOut(), first_exit=Exit())
     return Memory(met, Steering(turn, Reckoning(), side=where(p.first_bank < 0.0, -1.0, 1.0)))
 
@@ -249,9 +247,9 @@ def exit_of(t, s, p, o):
         angle, inertial, apoapsis = atan2(s.vz, sqrt(s.vx * s.vx + s.vy * s.vy)), v, NAN
     else:
         angle = velocity_angles(s.x, s.y, s.z, s.vx, s.vy, s.vz)[0]
-        r, w = Vector(s.x, s.y, s.z), Vector(s.vx - p.rate * s.y, s.vy + p.rate * s.x, s.vz)
-        h = cross(r, w)
-        inverse_a = 2.0 / norm(r) - dot(w, w) / p.mu
+        w = Vector(s.vx - p.rate * s.y, s.vy + p.rate * s.x, s.vz)
+        h = cross(s, w)
+        inverse_a = 2.0 / norm(s) - dot(w, w) / p.mu
         bound = inverse_a > 0.0
         a = 1.0 / where(bound, inverse_a, 1.0)
         e2 = maximum(1.0 - dot(h, h) / (p.mu * a), 0.0)
@@ -262,14 +260,17 @@ def exit_of(t, s, p, o):
 @physics
 def switch(t, s, m, p, o, hit):
     """Keep the larger of each peak, the first pull-out and the first exit, SI; change the bank where a roll is due."""
-    now, met = moment_of(t, s, p, o), m.met
+    now, met = moment_of(t, s, exposure_of(s, p, o)), m.met
     roll, leaving = hit.roll > 0.5, hit.leave > 0.5
     rolled, back = Lift(p.cos_rolled, p.sin_rolled, 1.0), Lift(p.cos_bank, p.sin_bank, 2.0)
-    return s, replace(m, met=Met(
-        pressed=where((hit.pressure_peak > 0.5) & (now.pressure > met.pressed.pressure), now, met.pressed),
-        hottest=where((hit.heat_peak > 0.5) & (now.flux > met.hottest.flux), now, met.hottest),
+    higher = (hit.pressure_peak > 0.5) & (now.dynamic_pressure > met.pressed.dynamic_pressure)
+    hotter = (hit.heat_peak > 0.5) & (now.heat_rate > met.hottest.heat_rate)
+    met = Met(
+        pressed=where(higher, now, met.pressed),
+        hottest=where(hotter, now, met.hottest),
         lift=where(roll & (met.lift.rolls == 0.0), rolled, where(roll, back, met.lift)),
         exits=where(leaving, met.exits + 1.0, met.exits),
         pull_out=where(hit.pull_out > 0.5, PullOut(now.altitude, t), met.pull_out),
         first_exit=where(leaving & (met.exits == 0.0), exit_of(t, s, p, o), met.first_exit),
-    ))  # fmt: skip
+    )
+    return s, replace(m, met=met)

@@ -55,18 +55,17 @@ def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusa
     """The first state with its errors, SI, and the entry that was planned without them."""
 
     def over_ground(speed, path, heading, radius, latitude):
-        """North, east, up of the velocity over ground [m/s]; the arguments are in the frame speed_frame."""
-        carried = carried_along(radius, latitude, world.rate)
-        return velocity_components(speed, path, heading) - np.where(
-            settings.speed_frame == CHOICES.speed_frame.inertial, carried, 0.0
-        )
+        """North, east, up, size [m/s] and path angle [rad] of the velocity over ground, from those in speed_frame."""
+        inertial = settings.speed_frame == CHOICES.speed_frame.inertial
+        carried = np.where(inertial, carried_along(radius, latitude, world.rate), 0.0)
+        north, east, up = velocity_components(speed, path, heading) - carried
+        return north, east, up, np.sqrt(north**2 + east**2 + up**2), np.arctan2(up, np.hypot(north, east))
 
     radius, altitude = _height(i, world)
     speed, path = _arrival(i, settings, world, radius, refusals)
     latitude, longitude = i.entry_latitude, i.entry_longitude
-    north, east, up = over_ground(speed, path, i.entry_heading, radius, latitude)
-    level = np.hypot(north, east)
-    heading = np.where(level > 0.0, np.arctan2(east, north), i.entry_heading)
+    north, east, _, flown_speed, flown_path = over_ground(speed, path, i.entry_heading, radius, latitude)
+    heading = np.where(np.hypot(north, east) > 0.0, np.arctan2(east, north), i.entry_heading)
     to_north, to_east, place = local_axes(latitude, longitude)
     ahead = np.cos(heading) * to_north + np.sin(heading) * to_east
     planned = Planned(
@@ -76,25 +75,22 @@ def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusa
         altitude=altitude,
         r=radius,
         latitude=latitude,
-        speed=np.sqrt(north**2 + east**2 + up**2),
-        path=np.arctan2(up, level),
+        speed=flown_speed,
+        path=flown_path,
         heading=heading,
     )
     speed, path = speed + i.entry_speed_error, path + i.entry_flight_path_angle_error
     latitude, longitude = latitude + i.entry_latitude_error, longitude + i.entry_longitude_error
     radius = radius + i.entry_altitude_error
-    north, east, up = over_ground(speed, path, i.entry_heading + i.entry_heading_error, radius, latitude)
+    heading_in_frame = i.entry_heading + i.entry_heading_error
+    north, east, up, speed, path = over_ground(speed, path, heading_in_frame, radius, latitude)
     to_north, to_east, place = local_axes(latitude, longitude)
     flat, zero = settings.shape == CHOICES.shape.flat, np.zeros_like(radius)
     flat_ahead, flat_right = turned(north, east, np.cos(heading), np.sin(heading))
     # minus zero would fly to other bits than zero does
-    return Entry(
-        position=np.where(flat, [zero, zero, radius - world.polar_radius], radius * place) + 0.0,
-        velocity=np.where(flat, [flat_ahead, -flat_right, up], north * to_north + east * to_east + up * place) + 0.0,
-        speed=np.sqrt(north**2 + east**2 + up**2),
-        path=np.arctan2(up, np.hypot(north, east)),
-        planned=planned,
-    )
+    position = np.where(flat, [zero, zero, radius - world.polar_radius], radius * place) + 0.0
+    velocity = np.where(flat, [flat_ahead, -flat_right, up], north * to_north + east * to_east + up * place) + 0.0
+    return Entry(position, velocity, speed, path, planned)
 
 
 def _height(i: SimpleNamespace, world: World):

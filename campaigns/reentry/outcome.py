@@ -4,12 +4,11 @@ from collections import namedtuple
 
 from campaigns.reentry.air import sound_speed
 from campaigns.reentry.bank import angle_at
-from campaigns.reentry.dynamics import NAN, PullOut, exit_of, exposure_of, from_planned_entry, moment_of, velocity
+from campaigns.reentry.dynamics import NAN, PullOut, exit_of, exposure_of, from_planned_entry, moment_of
 from campaigns.reentry.inputs import CHOICES
-from mc_engine.lanes import atan2, physics, sqrt, where
+from mc_engine.lanes import atan2, merged, physics, sqrt, where
 from mc_engine.model import Field, at_end, metrics, outputs
 from mc_engine.physics.frames import TURN, full_turn, geodetic_latitude, spherical, velocity_angles
-from mc_engine.physics.vectors import norm
 
 Outputs = outputs(
     altitude_km="geodetic altitude",
@@ -85,7 +84,7 @@ Metrics = metrics(
         "mass over drag area in hypersonic flow, dispersions included", low=0.0, unit="kg/m^2"
     ),
 )
-Ground = namedtuple("Ground", "latitude longitude downrange crossrange path heading")
+Ground = namedtuple("Ground", "latitude longitude downrange crossrange flight_path_angle heading")  # outputs
 
 
 @physics
@@ -113,30 +112,14 @@ def ground_of(s, altitude, p, o):
 @physics
 def observe(t, s, m, p, o):
     """Outputs, SI and radians."""
-    place, air, force, pressure, flux = exposure_of(s, p, o)
-    ground = ground_of(s, place.altitude, p, o)
+    exposure = exposure_of(s, p, o)
+    air, ground = exposure.air, ground_of(s, exposure.place.altitude, p, o)
     if o.guidance == CHOICES.guidance.none:
         bank = atan2(m.met.lift.sin_bank, m.met.lift.cos_bank)
     else:
         bank = angle_at(t, m.steering.turn, o.guidance_period)
-    return Outputs(
-        altitude=place.altitude,
-        speed=norm(velocity(s)),
-        flight_path_angle=ground.path,
-        heading=ground.heading,
-        latitude=ground.latitude,
-        longitude=ground.longitude,
-        downrange=ground.downrange,
-        crossrange=ground.crossrange,
-        load=pressure * force.total,
-        axial_load=pressure * force.axial,
-        dynamic_pressure=pressure,
-        heat_rate=flux,
-        heat_load=s.heat_load,
-        mach=air.speed / sound_speed(air.temperature),
-        density=air.density,
-        bank=bank,
-    )
+    mach = air.speed / sound_speed(air.temperature)
+    return merged(Outputs, ground, moment_of(t, s, exposure), s, mach=mach, density=air.density, bank=bank)
 
 
 @physics
@@ -155,25 +138,28 @@ def target_of(p, o):
 @physics
 def evaluate(t, s, m, p, o):
     """The metrics that are no outputs at the end of the flight, SI and radians."""
-    now, met, steering = moment_of(t, s, p, o), m.met, m.steering
+    now, met, steering = moment_of(t, s, exposure_of(s, p, o)), m.met, m.steering
     # the flight may end before a peak; the load peaks with the dynamic pressure
-    pressed = where(now.pressure > met.pressed.pressure, now, met.pressed)
-    hottest = where(now.flux > met.hottest.flux, now, met.hottest)
-    lowest = where(met.pull_out.time >= 0.0, met.pull_out, PullOut(now.altitude, t))
+    pressed = where(now.dynamic_pressure > met.pressed.dynamic_pressure, now, met.pressed)
+    hottest = where(now.heat_rate > met.hottest.heat_rate, now, met.hottest)
+    lowest = where(met.pull_out.min_altitude_time >= 0.0, met.pull_out, PullOut(now.altitude, t))
     ground = ground_of(s, now.altitude, p, o)
-    leaves = (o.on_exit == CHOICES.on_exit.stop) & (now.altitude > p.exit - 1e-3) & (ground.path > 0.0)
+    leaves = (o.on_exit == CHOICES.on_exit.stop) & (now.altitude > p.exit - 1e-3) & (ground.flight_path_angle > 0.0)
     first = where(leaves, exit_of(t, s, p, o), met.first_exit)
     violations = (
         where(pressed.load > p.corridor_load, 1.0, 0.0)
-        + where(hottest.flux > p.corridor_heat_rate, 1.0, 0.0)
+        + where(hottest.heat_rate > p.corridor_heat_rate, 1.0, 0.0)
         + where(s.heat_load > p.corridor_heat_load, 1.0, 0.0)
-        + where(pressed.pressure > p.corridor_dynamic_pressure, 1.0, 0.0)
+        + where(pressed.dynamic_pressure > p.corridor_dynamic_pressure, 1.0, 0.0)
     )
     miss_down, miss_cross = ground.downrange - p.aim_down, ground.crossrange - p.target_crossrange
     target_latitude, target_longitude = target_of(p, o)
     reference_range = NAN if o.guidance == CHOICES.guidance.none else p.planned_range
     sampled = steering.samples > 0.0
-    return Metrics(
+    return merged(
+        Metrics,
+        lowest,
+        first,
         peak_load=pressed.load,
         peak_load_time=pressed.time,
         peak_load_altitude=pressed.altitude,
@@ -182,23 +168,16 @@ def evaluate(t, s, m, p, o):
         peak_axial_load_time=pressed.time,
         peak_axial_load_altitude=pressed.altitude,
         peak_axial_load_speed=pressed.speed,
-        peak_dynamic_pressure=pressed.pressure,
+        peak_dynamic_pressure=pressed.dynamic_pressure,
         peak_dynamic_pressure_time=pressed.time,
         peak_dynamic_pressure_altitude=pressed.altitude,
         peak_dynamic_pressure_speed=pressed.speed,
-        peak_heat_rate=hottest.flux,
+        peak_heat_rate=hottest.heat_rate,
         peak_heat_rate_time=hottest.time,
         peak_heat_rate_altitude=hottest.altitude,
         peak_heat_rate_speed=hottest.speed,
         corridor_violations=violations,
-        min_altitude=lowest.altitude,
-        min_altitude_time=lowest.time,
         exits=where(leaves, 1.0, met.exits),
-        exit_time=first.time,
-        exit_speed=first.speed,
-        exit_flight_path_angle=first.angle,
-        exit_inertial_speed=first.inertial,
-        exit_apoapsis_altitude=first.apoapsis,
         miss=where(p.aimed > 0.5, sqrt(miss_down * miss_down + miss_cross * miss_cross), NAN),
         target_latitude=target_latitude,
         target_longitude=target_longitude,

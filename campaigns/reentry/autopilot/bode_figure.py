@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from campaigns.reentry.autopilot.gains import pitch_design
-from campaigns.reentry.autopilot.lead_compensator import Lead, Response
+from campaigns.reentry.autopilot.lead_compensator import Compensator, Response
 from campaigns.reentry.autopilot.model import MODEL
 
 
-def bode_figure(loops: dict[str, tuple[Response, float, Lead]]) -> Any:
+def bode_figure(loops: dict[str, tuple[Response, float, Compensator]]) -> Any:
     """Figure of gain and phase [deg] of open loops over the frequency [rad/s]: dashed without, solid with compensation.
 
     loops : by legend text, (plant, gain, compensator)
@@ -20,7 +20,7 @@ def bode_figure(loops: dict[str, tuple[Response, float, Lead]]) -> Any:
     upper, lower = figure.subplots(2, 1, sharex=True)
     w = np.geomspace(0.05, 200.0, 1200)
     for colour, (text, (plant, gain, lead)) in enumerate(loops.items()):
-        margins = lead.margins
+        margins = lead.margins(plant)
         legend = f"{text}: {np.degrees(margins.phase):.1f}° at {margins.crossover:.2f} rad/s"
         for loop, style, label in ((gain * plant(w), "--", None), (lead.response(w) * plant(w), "-", legend)):
             upper.loglog(w, np.abs(loop), style, color=f"C{colour}", label=label)

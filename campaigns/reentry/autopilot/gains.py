@@ -4,23 +4,21 @@ The tables hold the last second of the profile, the compensator of the bank loop
 of dynamic pressure, and the profile: dynamic pressure and speed of the planned entry second by second.  NumPy, SI.
 """
 
-from collections import namedtuple
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from campaigns.reentry.autopilot.lead_compensator import Lead, Response, design_lead, short_period
+from campaigns.reentry.autopilot.lead_compensator import Compensator, Response, design_lead, short_period
 from campaigns.reentry.guidance.plan import plan_of
 from campaigns.reentry.guidance.reference import SPEED, fly_reference
 
-Compensator = namedtuple("Compensator", "gain zero pole")  # gain (s + zero) / (s + pole)
 STEPS, STEEPEST = 48, 24e3  # compensators of the pitch loop, up to this pressure [Pa]
 LAST_SECOND, BANK, PITCH = 0, 1, 4  # where the tables have what
 PROFILE = PITCH + 3 * STEPS
 
 
-def pitch_design(o: Mapping[str, float], pressure: float) -> tuple[Response, float, Lead]:
+def pitch_design(o: Mapping[str, float], pressure: float) -> tuple[Response, float, Compensator]:
     """(plant, gain, lead compensator) of the pitch loop at a dynamic pressure [Pa]; o: settings by symbol.
 
     The plant is undamped: angle over angular acceleration.  The gain makes the loop stiffer than the air by the square
@@ -31,7 +29,7 @@ def pitch_design(o: Mapping[str, float], pressure: float) -> tuple[Response, flo
     return plant, gain, design_lead(plant, gain, o["phase_margin"])
 
 
-def bank_design(o: Mapping[str, float]) -> Lead:
+def bank_design(o: Mapping[str, float]) -> Compensator:
     """Lead compensator of the bank loop, whose plant is the double integrator 1/s^2 [s^2]."""
     return design_lead(short_period(0.0), o["bandwidth"] ** 2, o["phase_margin"])
 
@@ -49,6 +47,5 @@ def autopilot_tables(o: Any) -> np.ndarray:
     numbers = o._asdict()
     pressures = np.linspace(0.0, STEEPEST, STEPS) if o.scheduled > 0.5 else np.full(STEPS, o.fixed_pressure)
     leads = [bank_design(numbers), *(pitch_design(numbers, pressure)[2] for pressure in pressures)]
-    compensators = [(lead.gain, lead.zero, lead.pole) for lead in leads]
     profile = planned_profile()
-    return np.concatenate([[len(profile) - 1], np.ravel(compensators), np.ravel(profile)])
+    return np.concatenate([[len(profile) - 1], np.ravel(leads), np.ravel(profile)])

@@ -7,8 +7,7 @@ K. Ogata, Modern Control Engineering, section on lead compensation by the freque
 
 from collections import namedtuple
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy  # loads its packages when they are used
@@ -16,24 +15,24 @@ import scipy  # loads its packages when they are used
 Response = Callable[[Any], Any]  # frequency [rad/s] -> complex gain
 FREQUENCIES = np.geomspace(1e-3, 1e4, 4001)
 LARGEST_LEAD = np.radians(75.0)  # of one stage
-
-
 # phase margin [rad] at the highest crossover [rad/s], where the loop's gain falls through 1
 Margins = namedtuple("Margins", "phase crossover")
 
 
-@dataclass(frozen=True)
-class Lead:
-    """gain (s + zero) / (s + pole); margins : of the compensated loop."""
+class Compensator(NamedTuple):
+    """gain (s + zero) / (s + pole)."""
 
     gain: float
     zero: float
     pole: float
-    margins: Margins
 
     def response(self, w: Any) -> Any:
         """Complex gain at a frequency w [rad/s]: gain (j w + zero) / (j w + pole)."""
         return self.gain * (1j * w + self.zero) / (1j * w + self.pole)
+
+    def margins(self, plant: Response) -> Margins:
+        """Those of the loop with this plant: phase margin [rad], crossover [rad/s]."""
+        return margins_of(lambda w: self.response(w) * plant(w))
 
 
 def crossover_of(loop: Response, level: float = 1.0) -> float:
@@ -57,7 +56,7 @@ def margins_of(loop: Response) -> Margins:
     return Margins(float(np.angle(-loop(w))), w)
 
 
-def design_lead(plant: Response, gain: float, margin: float) -> Lead:
+def design_lead(plant: Response, gain: float, margin: float) -> Compensator:
     """Lead compensator that keeps the low-frequency gain of `gain` times the plant and has a phase margin [rad].
 
     The crossover moves up, where the plant may lag more: the lead is changed until the margin is the one asked for.  A
@@ -71,8 +70,8 @@ def design_lead(plant: Response, gain: float, margin: float) -> Lead:
     wanted = margin - margins_of(bare).phase + np.radians(5.0)
     for _ in range(30):
         alpha = ratio_of_lead(min(max(wanted, 1e-3), LARGEST_LEAD))
-        lead = stage(plant, gain, alpha, crossover_of(bare, float(np.sqrt(alpha))))
-        short = margin - lead.margins.phase
+        lead = stage(gain, alpha, crossover_of(bare, float(np.sqrt(alpha))))
+        short = margin - lead.margins(plant).phase
         if abs(short) <= 1e-6:
             break
         wanted += short
@@ -84,11 +83,10 @@ def ratio_of_lead(lead: float) -> float:
     return (1.0 - np.sin(lead)) / (1.0 + np.sin(lead))
 
 
-def stage(plant: Response, gain: float, alpha: float, w: float) -> Lead:
+def stage(gain: float, alpha: float, w: float) -> Compensator:
     """The compensator with the ratio alpha of zero to pole, its largest lead at w [rad/s]: zero w sqrt(alpha)."""
     root = float(np.sqrt(alpha))
-    bare = Lead(gain / alpha, w * root, w / root, Margins(0.0, 0.0))
-    return replace(bare, margins=margins_of(lambda x: bare.response(x) * plant(x)))
+    return Compensator(gain / alpha, w * root, w / root)
 
 
 def short_period(stiffness: float) -> Response:

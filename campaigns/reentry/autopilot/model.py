@@ -9,16 +9,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from campaigns.reentry.autopilot.gains import (
-    BANK,
-    LAST_SECOND,
-    PITCH,
-    PROFILE,
-    STEEPEST,
-    STEPS,
-    Compensator,
-    autopilot_tables,
-)
+from campaigns.reentry.autopilot.gains import BANK, LAST_SECOND, PITCH, PROFILE, STEEPEST, STEPS, autopilot_tables
+from campaigns.reentry.autopilot.lead_compensator import Compensator
 from campaigns.reentry.guidance.reference_table import between_rows
 from mc_engine.lanes import floor, look_up, look_up_record, maximum, minimum, physics, sqrt, where
 from mc_engine.model import (

@@ -159,38 +159,33 @@ def commanded_share(t, kept, x, p, o):
 
 
 @physics
-def steer(t, s, m, p, o, draws):
+def control(t, s, m, p, o, draws):
     """One sample: sense, ask for a share of the lift, choose its side, and send the bank [rad] after it."""
-    x = sensed(s, p, o, draws)
-    share, speed, reckoning = commanded_share(t, m.reckoning, x, p, o)
+    if o.guidance == CHOICES.guidance.none:
+        return m
+    x, kept = sensed(s, p, o, draws), m.steering
+    share, speed, reckoning = commanded_share(t, kept.reckoning, x, p, o)
     if o.guidance == CHOICES.guidance.law3 or o.guidance == CHOICES.guidance.law3r:
         felt, load = x.axial, x.axial * x.load_by_axial
     else:
         felt, load = x.drag, x.drag * x.load_by_drag
-    active = where((m.active > 0.5) | (felt > STEERED), 1.0, 0.0)
+    active = where((kept.active > 0.5) | (felt > STEERED), 1.0, 0.0)
     working = (active > 0.5) & (speed > LAST_SPEED)
     share = where(working, share, p.planned_share)
     # a load above the limit calls for all the lift upwards, whatever the law wants
     share = where(load > p.load_limit, 1.0, share)
     inside = minimum(maximum(share, LEAST_SHARE), 1.0)
-    side = where(active > 0.5, side_of(m.side, lateral_miss(s, p), norm(velocity(s)), p), m.side)
+    side = where(active > 0.5, side_of(kept.side, lateral_miss(s, p), norm(velocity(s)), p), kept.side)
     command = side * acos(inside) + p.bank_error
-    bank, rate = m.turn.next_bank, m.turn.next_rate
+    bank, rate = kept.turn.next_bank, kept.turn.next_rate
     next_bank, next_rate = followed(bank, rate, command, p.bank_lag, p.bank_rate_limit, o.guidance_period)
-    return Steering(
+    steering = Steering(
         turn=Turn(t, where(p.bank_lag > 0.0, bank, next_bank), rate, next_bank, next_rate),  # without a lag at once
         reckoning=reckoning,
         side=side,
         active=active,
-        samples=m.samples + where(working, 1.0, 0.0),
-        saturated=m.saturated + where(working & (share != inside), 1.0, 0.0),
-        reversals=m.reversals + where(side != m.side, 1.0, 0.0),
+        samples=kept.samples + where(working, 1.0, 0.0),
+        saturated=kept.saturated + where(working & (share != inside), 1.0, 0.0),
+        reversals=kept.reversals + where(side != kept.side, 1.0, 0.0),
     )
-
-
-@physics
-def control(t, s, m, p, o, draws):
-    """The memory after a sample; nothing happens without a law."""
-    if o.guidance != CHOICES.guidance.none:
-        m = replace(m, steering=steer(t, s, m.steering, p, o, draws))
-    return m
+    return replace(m, steering=steering)

@@ -14,6 +14,7 @@ from campaigns.reentry.airframe import airframe_of
 from campaigns.reentry.entry_state import Entry, Planned, World, entry_of, world_of
 from campaigns.reentry.inputs import CHOICES, GUIDANCE, Inputs
 from campaigns.reentry.vehicles import Vehicle
+from mc_engine.lanes import merged
 from mc_engine.model import Parameter, Refusals
 from mc_engine.physics.constants import J2_EARTH
 
@@ -50,17 +51,15 @@ def plans_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, planne
     numbers = given & (settings.vehicle == CHOICES.vehicle.given)  # one of vehicles.py brings its own
     drag = airframe.reference_area * airframe.drag_coefficient / airframe.mass
     lift_to_drag = airframe.lift_coefficient / airframe.drag_coefficient
-    return Plan(
-        **world._replace(mu=np.where(settings.gravity == CHOICES.gravity.none, 0.0, world.mu))._asdict(),
+    return merged(
+        Plan,
+        world,
+        planned,
+        mu=np.where(settings.gravity == CHOICES.gravity.none, 0.0, world.mu),
         j2=np.where(settings.gravity == CHOICES.gravity.j2, J2_EARTH, 0.0),
         law=_LAW[settings.guidance.astype(int)],
         atmosphere=settings.atmosphere,
         vehicle=settings.vehicle,
-        r=planned.r,
-        latitude=planned.latitude,
-        speed=planned.speed,
-        path=planned.path,
-        heading=planned.heading,
         drag=np.where(numbers, 1.0 / settings.plan_ballistic_coefficient, drag),
         lift_to_drag=np.where(numbers, settings.plan_lift_to_drag, lift_to_drag),
         trim=np.where(numbers, settings.plan_trim_angle, airframe.trim_angle),

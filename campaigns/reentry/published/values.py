@@ -203,6 +203,7 @@ def ogata_lead(number: str) -> float:
     """
     alpha = round(float(ratio_of_lead(np.radians(38.0))), 2)
     w = float(round(crossover_of(lambda x: 10.0 * ogata_plant(x), float(np.sqrt(alpha)))))
-    lead, bare = stage(ogata_plant, 10.0, alpha, w), margins_of(lambda x: 10.0 * ogata_plant(x))
-    margins = {"phase": np.degrees(lead.margins.phase), "crossover": lead.margins.crossover}
-    return float((vars(lead) | margins | {"bare phase": np.degrees(bare.phase)})[number])
+    lead, bare = stage(10.0, alpha, w), margins_of(lambda x: 10.0 * ogata_plant(x))
+    phase, crossover = lead.margins(ogata_plant)
+    margins = {"phase": np.degrees(phase), "crossover": crossover, "bare phase": np.degrees(bare.phase)}
+    return float((lead._asdict() | margins)[number])

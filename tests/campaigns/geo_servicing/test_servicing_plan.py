@@ -11,7 +11,7 @@ from servicing_flights import KEPLER, NOMINAL, SOURCE_BURNS, fly_one
 from servicing_twin import MU, R0, RATE, SIDEREAL_DAY, Twin, sidereal
 
 from campaigns.geo_servicing import drift_model as drift
-from campaigns.geo_servicing.bellman import best_corrections, planned_cost
+from campaigns.geo_servicing.drift_model import best_corrections, planned_cost
 from campaigns.geo_servicing.inspection import correction
 from campaigns.geo_servicing.model import MODEL
 from campaigns.geo_servicing.published.values import craft_of
@@ -106,68 +106,64 @@ def random_system(seed, n=4):
     t = rng.uniform(0.25, 2.0, n)
     a = np.array([[[1.0, one], [0.0, 1.0]] for one in t])
     half = rng.normal(size=(2, 2))
-    return a, np.column_stack([t, np.ones(n)]), rng.normal(size=(n, 2)), 0.1 * np.eye(2), 0.3, half @ half.T + np.eye(2)
+    return a, np.column_stack([t, np.ones(n)]), 0.3, half @ half.T + np.eye(2)
 
 
-def mean_cost(a, b, c, running, weight, terminal, sigma, corrections, first):
-    """The mean cost of any such corrections from the state `first`, by its first and second moments."""
-    mean, second, cost = np.array(first, dtype=np.float64), np.outer(first, first), 0.0
+def mean_cost(a, b, weight, terminal, sigma, gains, first):
+    """The mean cost of corrections by any such gains from the state `first`, by its second moments."""
+    second, cost = np.outer(first, first), 0.0
     for k in range(len(a)):
-        gain, offset = corrections.gains[k], corrections.offsets[k]
-        u2 = gain @ second @ gain + 2.0 * offset * gain @ mean + offset**2
-        cost += np.trace(running @ second) + weight * u2
-        closed, push = a[k] - np.outer(b[k], gain), c[k] - b[k] * offset
-        cross = np.outer(closed @ mean, push)
-        second = closed @ second @ closed.T + cross + cross.T + np.outer(push, push)
-        second = second + sigma**2 * u2 * np.outer(b[k], b[k])
-        mean = closed @ mean + push
+        u2 = gains[k] @ second @ gains[k]
+        cost += weight * u2
+        closed = a[k] - np.outer(b[k], gains[k])
+        second = closed @ second @ closed.T + sigma**2 * u2 * np.outer(b[k], b[k])
     return float(cost + np.trace(terminal @ second))
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_no_change_of_any_gain_lowers_the_mean_cost(seed):
-    system = (*random_system(seed), 0.3)
-    best, first = best_corrections(*system), np.array([1.3, -0.4])
-    least = mean_cost(*system, best, first)
+    system, first = (*random_system(seed), 0.3), np.array([1.3, -0.4])
+    gains, costs = best_corrections(*system)
+    least = mean_cost(*system, gains, first)
+    assert least == pytest.approx(first @ costs[0] @ first, rel=1e-12)
     rng = np.random.default_rng(seed)
     for _ in range(50):
-        gains, offsets = best.gains + 1e-2 * rng.normal(size=(4, 2)), best.offsets + 1e-2 * rng.normal(size=4)
-        assert mean_cost(*system, type(best)(gains, offsets, best.costs), first) > least
+        assert mean_cost(*system, gains + 1e-2 * rng.normal(size=(4, 2)), first) > least
 
 
 def test_the_mean_cost_is_that_of_many_noisy_trials():
-    a, b, c, running, weight, terminal = random_system(7)
-    best = best_corrections(a, b, c, running, weight, terminal, 0.3)
+    a, b, weight, terminal = random_system(7)
+    gains, _ = best_corrections(a, b, weight, terminal, 0.3)
     rng, n = np.random.default_rng(1), 200_000
     x, cost = np.tile([1.3, -0.4], (n, 1)), np.zeros(n)
     for k in range(4):
-        u = -x @ best.gains[k] - best.offsets[k]
-        cost += np.einsum("ni,ij,nj->n", x, running, x) + weight * u**2
-        x = x @ a[k].T + np.outer(u * (1.0 + 0.3 * rng.normal(size=n)), b[k]) + c[k]
+        u = -x @ gains[k]
+        cost += weight * u**2
+        x = x @ a[k].T + np.outer(u * (1.0 + 0.3 * rng.normal(size=n)), b[k])
     cost += np.einsum("ni,ij,nj->n", x, terminal, x)
-    exact = mean_cost(a, b, c, running, weight, terminal, 0.3, best, [1.3, -0.4])
+    exact = mean_cost(a, b, weight, terminal, 0.3, gains, [1.3, -0.4])
     assert cost.mean() == pytest.approx(exact, abs=4.0 * cost.std() / np.sqrt(n))
 
 
 def test_one_step_of_the_recursion_is_the_inspection_law():
     t, chi1, chi2, weight, sigma = 1.7, 0.6, 0.2, 0.1, 0.05
     terminal = np.array([[1.0, chi2], [chi2, chi1]])
-    step = (np.array([[[1.0, t], [0.0, 1.0]]]), np.array([[t, 1.0]]), np.zeros((1, 2)))
-    gain = best_corrections(*step, np.zeros((2, 2)), weight, terminal, sigma).gains[0]
+    step = (np.array([[[1.0, t], [0.0, 1.0]]]), np.array([[t, 1.0]]))
+    gain = best_corrections(*step, weight, terminal, sigma)[0][0]
     y, v = 0.3, -0.7
     assert -gain @ [y, v] == pytest.approx(correction(y, v, t, chi1, chi2, weight, sigma), rel=1e-12)
 
 
 def test_errors_of_the_plan_that_are_answered_cost_what_the_recursion_says():
-    a, b, _, _, _, terminal = random_system(3)
-    none, u = np.zeros((2, 2)), np.array([1.0, -0.5, 0.2, 0.1])
-    best = best_corrections(a, b, np.zeros((4, 2)), none, 1e-9, terminal, 0.0)
+    a, b, _, terminal = random_system(3)
+    u = np.array([1.0, -0.5, 0.2, 0.1])
+    gains, costs = best_corrections(a, b, 1e-9, terminal, 0.0)
     rng, n = np.random.default_rng(2), 200_000
     x = np.zeros((n, 2))
     for k in range(4):  # deviations from the plan; the answers themselves are exact
-        x = x @ (a[k] - np.outer(b[k], best.gains[k])).T + np.outer(0.01 * u[k] * rng.normal(size=n), b[k])
+        x = x @ (a[k] - np.outer(b[k], gains[k])).T + np.outer(0.01 * u[k] * rng.normal(size=n), b[k])
     cost = np.einsum("ni,ij,nj->n", x, terminal, x)
-    expected = planned_cost(b, best.costs, u, 0.01)
+    expected = planned_cost(b, costs, u, 0.01)
     assert cost.mean() == pytest.approx(expected, abs=4.0 * cost.std() / np.sqrt(n) + 1e-6 * expected)
 
 
