@@ -13,7 +13,7 @@ the law chooses each coast and each correction.
 """
 
 from collections import namedtuple
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from campaigns.geo_servicing.drift_model import DRIFT_PER_DV
 from campaigns.geo_servicing.dynamics import MU, RATE, SIDEREAL_DAY, longitudes
@@ -39,8 +39,9 @@ TransferEnd = namedtuple(
     "TransferEnd",
     "transfer_time longitude_deviation mean_longitude_deviation drift_rate eccentricity inclination longitude_sum "
     "daily_mean_longitude_deviation actual_drift_rate",
-    defaults=[float("nan")] * 9,
 )
+NO_END = TransferEnd(*[float("nan")] * 9)
+Shadow = namedtuple("Shadow", "penumbra umbra")
 
 
 class Memory(NamedTuple):
@@ -52,7 +53,7 @@ class Memory(NamedTuple):
     burn: Burn = Burn(0.0, 0.0, 0.0, 0.0)
     settled: float = 0.0  # 1 once the inspection counts as settled
     second: float = 0.0  # 1 between two burns that make a pair
-    end: TransferEnd = TransferEnd()
+    end: TransferEnd = NO_END
     estimate: Estimate = NO_ESTIMATE
     after: Error = EXACT  # of the single fix that follows the next burn
     d1: float = 0.0  # fresh normal deviates for that burn
@@ -71,29 +72,24 @@ def start(o):
     return Memory()
 
 
-def shadow_edge(side: float) -> Any:
-    """Physics: angle [rad] from an edge of the Earth's shadow, of the umbra for side 1, of the penumbra for side -1.
+@physics
+def shadow_edges(t, s, p, o):
+    """Angles [rad] of the Sun from the edges of the Earth's shadow, seen from the craft; 1 where sunlight has no push.
 
     At the edges nothing is done: steps end there, since the light has corners that no step may go over.
     """
-
-    @physics
-    def angle(t, s, p, o):
-        """Angle [rad] of the Sun from the shadow's edge, seen from the craft; 1 where sunlight does not push."""
-        if o.sunlight > 0.5:
-            sx, sy, sz, _, _, _ = ephemeris(p.sun_moon_time + t, o.tables, p.sun_moon)
-            sun, earth, apart = discs(s.x, s.y, s.z, sx, sy, sz)
-            return apart - earth + side * sun
-        return 1.0
-
-    return angle
+    if o.sunlight > 0.5:
+        sx, sy, sz, _, _, _ = ephemeris(p.sun_moon_time + t, o.tables, p.sun_moon)
+        sun, earth, apart = discs(s.x, s.y, s.z, sx, sy, sz)
+        return Shadow(penumbra=apart - earth - sun, umbra=apart - earth + sun)
+    return Shadow(penumbra=1.0, umbra=1.0)
 
 
 EVENTS = {
     "due": Event(physics(lambda t, m: t - m.due), "rising", "switch", rare=True),
     "settle": Event(physics(lambda t, o: t - o.settle_time), "rising", "switch", rare=True),
-    "penumbra": Event(shadow_edge(-1.0), "either", "switch", rare=True),
-    "umbra": Event(shadow_edge(1.0), "either", "switch", rare=True),
+    "penumbra": Event(shadow_edges, "either", "switch", rare=True),
+    "umbra": Event(shadow_edges, "either", "switch", rare=True),
 }
 
 
@@ -107,7 +103,8 @@ def drift_of(a):
 def ended(t, s, p):
     """The `TransferEnd` [s, rad, rad/rev] of a transfer that ends here; the day after is still to come."""
     true, mean, x = longitudes(t, s, p)
-    return TransferEnd(
+    return replace(
+        NO_END,
         transfer_time=t,
         longitude_deviation=true,
         mean_longitude_deviation=mean,

@@ -80,9 +80,10 @@ EXTREMA = {
     "settled_far": maximum_of("settled_range_m", "largest settled range"),
     "settled_near": maximum_of("settled_nearness_m", "smallest settled range, negative"),
 }
-# quantities and metrics of the inspection, by their names; what a phase without a target does not have
-Pair = namedtuple("Pair", "along_track radial range relative_drift relative_eccentricity")
-NO_PAIR = Pair(NONE, NONE, 0.0, 0.0, 0.0)
+# quantities and metrics of the inspection, by their names, as other phases have them
+Pair = namedtuple(
+    "Pair", "along_track radial range relative_drift relative_eccentricity", defaults=(NONE, NONE, 0.0, 0.0, 0.0)
+)
 Inspected = namedtuple(
     "Inspected", "min_range max_range settled_min_range settled_max_range relative_drift relative_eccentricity steady"
 )
@@ -104,7 +105,7 @@ def pair_of(s, o):
         seen = matrix_times(Matrix(*orbital_axes(r.x, r.y, r.z, v.x, v.y, v.z)), away)
         true = relative_orbit(s, EXACT)
         return Pair(seen.y, seen.x, norm(away), true.drift, true.e)
-    return NO_PAIR
+    return Pair()
 
 
 @physics

@@ -96,7 +96,10 @@ def design(craft: Craft) -> Plan:
     limits, lacking = limits_of(craft.o), End(0.0, 0.0, 0.0, 0.0)
     starts = first_approximations(craft, limits)
     for _ in range(PASSES):
-        plan = _best(craft, limits, lacking, starts)
+        improved = [better for start in starts if (better := _improved(craft, limits, lacking, start))]
+        if not improved:
+            raise ModelError("no phasing plan meets the limits on coasts, time, last correction and eccentricity")
+        _, plan = min(improved, key=lambda pair: pair[0])
         _, flown = craft.fly_plan(plan)
         if abs(flown.y) < SETTLED * limits.y and abs(flown.v - craft.o.aim_drift) < SETTLED * limits.v:
             return plan
@@ -127,15 +130,6 @@ def limits_of(o: Any) -> Limits:
     coasts[0] = o.first_coast / SIDEREAL_DAY
     last = np.radians(drift_model.largest_last(np.degrees(y), np.degrees(v), e, max(o.assumed_thrust, 1e-6), 0.5))
     return Limits(y, v, e, coasts, o.longest_transfer / SIDEREAL_DAY, o.largest_last or last)
-
-
-def _best(craft: Craft, limits: Limits, lacking: End, starts: list[Plan]) -> Plan:
-    """The plan of least cost among those that the starts lead to."""
-    improved = [_improved(craft, limits, lacking, start) for start in starts]
-    feasible = [candidate for candidate in improved if candidate is not None]
-    if not feasible:
-        raise ModelError("no phasing plan meets the limits on coasts, time, last correction and eccentricity")
-    return min(feasible, key=lambda pair: pair[0])[1]
 
 
 def _improved(craft: Craft, limits: Limits, lacking: End, start: Plan) -> tuple[float, Plan] | None:

@@ -34,11 +34,11 @@ Memory = namedtuple("Memory", "met steering")
 Met = namedtuple("Met", "pressed hottest lift exits pull_out first_exit")
 Lift = namedtuple("Lift", "cos_bank sin_bank rolls")  # present direction, and how often it was changed
 # by the names of the metrics
-PullOut = namedtuple("PullOut", "min_altitude min_altitude_time", defaults=[NAN] * 2)
+PullOut = namedtuple("PullOut", "min_altitude min_altitude_time", defaults=(NAN, NAN))
 Exit = namedtuple(
     "Exit",
     "exit_time exit_speed exit_flight_path_angle exit_inertial_speed exit_apoapsis_altitude",
-    defaults=[NAN] * 5,
+    defaults=(NAN, NAN, NAN, NAN, NAN),
 )
 Steering = namedtuple(
     "Steering", "turn reckoning side active samples saturated reversals", defaults=(0.0, 0.0, 0.0, 0.0)

@@ -24,10 +24,7 @@ FIRST = 1  # index at which the tables of the cases begin
 
 
 def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
-    """Kernel parameters of each case.
-
-    inputs : float64[n] by symbol, SI;  settings : codes, float64[n], by symbol.  Refused cases join `refusals`.
-    """
+    """Kernel parameters of each case, SI; inputs, and settings as codes, by symbol."""
     _refuse_what_does_not_fit(settings, refusals)
     world = world_of(inputs, settings)
     entry = entry_of(inputs, settings, world, refusals)
@@ -114,7 +111,6 @@ def _case_tables(i: SimpleNamespace, settings: SimpleNamespace, references: np.n
 
 
 HIGHEST_LANDING_KM = 35.0  # a flight that ends higher has left the atmosphere again, or ran out of time
-
 CORRIDOR = ("peak_load_g", "peak_axial_load_g", "peak_dynamic_pressure_pa", "peak_heat_rate_w_m2", "heat_load_j_m2")
 # a map is drawn where the run disperses its two inputs
 FIGURES = (

@@ -137,9 +137,7 @@ def _lower_merged(context, builder, sig, args):
     def field(name):
         if name in given:
             return given[name]
-        return next(
-            builder.extract_value(value, ty.fields.index(name)) for ty, value in records if name in ty.fields
-        )
+        return next(builder.extract_value(value, ty.fields.index(name)) for ty, value in records if name in ty.fields)
 
     fields = [field(name) for name in sig.return_type.fields]
     return context.make_tuple(builder, sig.return_type, fields)

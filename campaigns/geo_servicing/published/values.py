@@ -35,14 +35,9 @@ def interval_end(metric: str, sigmas: float) -> float:
     return float(values.mean() + sigmas * values.std(ddof=1))
 
 
-def smallest(metric: str) -> float:
-    """Smallest value of a metric of all cases, one error a run; axis of the histogram of section 9.2."""
-    return float(_per_run(metric).min())
-
-
-def largest(metric: str) -> float:
-    """Largest value of a metric of all cases, one error a run; axis of the histogram of section 9.2."""
-    return float(_per_run(metric).max())
+def extreme(metric: str, which: str) -> float:
+    """The "min" or "max" of a metric of all cases, one error a run; axis of the histogram of section 9.2."""
+    return float(getattr(_per_run(metric), which)())
 
 
 def share_in_tolerance_pct() -> float:

@@ -5,6 +5,7 @@ short period about trim, I a'' = q S d [C_ma (a - offset) + C_mq d a' / (2 V)] +
 Both torques are limited.  The pitch gains follow the dynamic pressure.
 """
 
+from collections import namedtuple
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from campaigns.reentry.autopilot.gains import BANK, LAST_SECOND, PITCH, PROFILE, STEEPEST, STEPS, autopilot_tables
 from campaigns.reentry.autopilot.lead_compensator import Compensator
 from campaigns.reentry.guidance.reference_table import between_rows
-from mc_engine.lanes import floor, look_up, look_up_record, maximum, minimum, physics, sqrt, where
+from mc_engine.lanes import floor, look_up, look_up_record, maximum, merged, minimum, physics, replace, sqrt, where
 from mc_engine.model import (
     Field,
     FixedStep,
@@ -102,6 +103,10 @@ Metrics = metrics(
 )
 
 
+# states and outputs that both loops give, by their names
+Loops = namedtuple("Loops", "torque_pitch torque_roll bank_error lead_alpha lead_bank limited")
+
+
 def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
     """Kernel parameters of each case, SI: the inputs, and coefficients over its inertia."""
     pitch, roll = settings.inertia_pitch * i.inertia_pitch_factor, settings.inertia_roll * i.inertia_roll_factor
@@ -156,38 +161,41 @@ def bank_command(t, p):
 
 
 @physics
-def torques(t, s, p, o, pressure):
-    """(pitch torque, roll torque [N m] within their limits, bank error, rates of both compensators, at a limit)."""
+def loops(t, s, p, o, pressure):
+    """The `Loops`, SI and radians: torques within their limits, rates of both compensators, the bank error."""
     error = bank_command(t, p) - s.bank
     follow, turn = pitch_gains(p.pressure_known_factor * pressure, o), look_up_record(o.tables, BANK, Compensator)
     wanted_pitch = o.inertia_pitch * follow.gain * (s.lead_alpha - s.alpha)
     wanted_roll = o.inertia_roll * turn.gain * (s.lead_bank + error)
     pitch = minimum(maximum(wanted_pitch, -p.torque_pitch), p.torque_pitch)
     roll = minimum(maximum(wanted_roll, -p.torque_roll), p.torque_roll)
-    # (s + z) / (s + p) = 1 + (z - p) / (s + p)
-    lead_alpha = -follow.pole * s.lead_alpha - (follow.zero - follow.pole) * s.alpha
-    lead_bank = -turn.pole * s.lead_bank + (turn.zero - turn.pole) * error
-    limited = where((pitch != wanted_pitch) | (roll != wanted_roll), 1.0, 0.0)
-    return pitch, roll, error, lead_alpha, lead_bank, limited
+    return Loops(
+        torque_pitch=pitch,
+        torque_roll=roll,
+        bank_error=error,
+        # (s + z) / (s + p) = 1 + (z - p) / (s + p)
+        lead_alpha=-follow.pole * s.lead_alpha - (follow.zero - follow.pole) * s.alpha,
+        lead_bank=-turn.pole * s.lead_bank + (turn.zero - turn.pole) * error,
+        limited=where((pitch != wanted_pitch) | (roll != wanted_roll), 1.0, 0.0),
+    )
 
 
 @physics
 def rhs(t, s, p, o):
     """Short period about trim with linear coefficients, derived here, and free roll, SI and radians; see the head."""
     pressure, speed = air_at(t, p, o)
-    pitch, roll, error, lead_alpha, lead_bank, limited = torques(t, s, p, o, pressure)
+    x = loops(t, s, p, o, pressure)
     air = pressure * (p.moment * (s.alpha - p.trim_offset) + p.damping * s.alpha_rate / speed)
-    return State(
+    return merged(
+        State,
+        x,
         alpha=s.alpha_rate,
-        alpha_rate=air + pitch * p.inverse_pitch,
+        alpha_rate=air + x.torque_pitch * p.inverse_pitch,
         bank=s.bank_rate,
-        bank_rate=pressure * p.roll_moment + roll * p.inverse_roll,
-        lead_alpha=lead_alpha,
-        lead_bank=lead_bank,
+        bank_rate=pressure * p.roll_moment + x.torque_roll * p.inverse_roll,
         alpha_square=s.alpha * s.alpha,
-        bank_square=error * error,
-        impulse=abs(pitch) + abs(roll),
-        limited=limited,
+        bank_square=x.bank_error * x.bank_error,
+        impulse=abs(x.torque_pitch) + abs(x.torque_roll),
     )
 
 
@@ -195,17 +203,9 @@ def rhs(t, s, p, o):
 def observe(t, s, p, o):
     """Outputs, SI and radians."""
     pressure, _ = air_at(t, p, o)
-    pitch, roll, error, _, _, _ = torques(t, s, p, o, pressure)
-    return Outputs(
-        alpha=s.alpha,
-        bank=s.bank,
-        bank_command=bank_command(t, p),
-        dynamic_pressure=pressure,
-        alpha_size=abs(s.alpha),
-        bank_error=abs(error),
-        torque_pitch=pitch,
-        torque_roll=roll,
-    )
+    x, command, alpha_size = loops(t, s, p, o, pressure), bank_command(t, p), abs(s.alpha)
+    x = replace(x, bank_error=abs(x.bank_error))
+    return merged(Outputs, s, x, bank_command=command, dynamic_pressure=pressure, alpha_size=alpha_size)
 
 
 @physics

@@ -63,20 +63,15 @@ def ballistic(b: Any) -> dict[str, Any]:
     return {"mass_kg": b, "reference_area_m2": 1.0, "drag_coefficient": 1.0, "lift_coefficient": 0.0}
 
 
-def entries_from_orbit(b: np.ndarray) -> dict[str, np.ndarray]:
-    """Columns of entries at circular speed and −2°, of ballistic coefficients b [kg/m^2].
+def load_from_orbit_g(which: str) -> float:
+    """The "min" or "max" of the largest loads [g] of entries at circular speed and −2°, 50 to 1000 kg/m^2.
 
     Each starts where rho / B is that of 100 kg/m^2 at 120 km: eq. (5) of the source has then one solution for all.
     """
+    b = np.array([50.0, 100.0, 200.0, 400.0, 1000.0])
     altitude_km = 120.0 - 1e-3 * SCALE_M * np.log(b / 100.0)
     start = {"entry_altitude_km": altitude_km, "entry_speed_m_s": circular_speed(altitude_km), "stop_altitude_km": 5.0}
-    return chosen_cases(MODEL, TEXTBOOK | ballistic(b) | start | EXACT)
-
-
-def load_from_orbit_g(which: str) -> float:
-    """The "min" or "max" of the largest loads [g] of entries from orbit, 50 to 1000 kg/m^2."""
-    loads = entries_from_orbit(np.array([50.0, 100.0, 200.0, 400.0, 1000.0]))["peak_load_g"]
-    return float(getattr(loads, which)())
+    return float(getattr(chosen_cases(MODEL, TEXTBOOK | ballistic(b) | start | EXACT)["peak_load_g"], which)())
 
 
 def excess_of_gravity_pct(which: str) -> float:
