@@ -34,7 +34,7 @@ SHORTEST_BURN = 1e-6  # s
 
 # velocity change that is commanded [m/s]; thrust [N] outward, ahead and to the normal
 Burn = namedtuple("Burn", "dv outward ahead across")
-# at the end of the last phasing burn, by the names of the outputs and metrics; with the longitude deviation's integral
+# at the end of the last phasing burn, SI and radians, by the names of outputs and metrics; longitude_sum: of the state
 TransferEnd = namedtuple(
     "TransferEnd",
     "transfer_time longitude_deviation mean_longitude_deviation drift_rate eccentricity inclination longitude_sum "

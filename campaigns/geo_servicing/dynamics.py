@@ -10,13 +10,14 @@ from campaigns.geo_servicing import plan_table
 from campaigns.geo_servicing.inputs import CHOICES
 from mc_engine.lanes import any_lane, atan2, merged, physics, sincos
 from mc_engine.model import states
-from mc_engine.physics.frames import half_turn, orbital_axes, turned
+from mc_engine.physics.earth_frames import ric_from_eci
+from mc_engine.physics.frames import half_turn, turned
 from mc_engine.physics.geopotential import MU_EGM2008, RADIUS_EGM2008, harmonics
 from mc_engine.physics.gravity import point_mass
 from mc_engine.physics.orbital_elements import equinoctial
 from mc_engine.physics.radiation import solar_pressure
 from mc_engine.physics.sun_moon import MU_MOON, MU_SUN, ephemeris, third_body
-from mc_engine.physics.vectors import Matrix, Vector, added, norm, transposed_times
+from mc_engine.physics.vectors import Vector, added, norm, transposed_times
 
 MU = MU_EGM2008
 SIDEREAL_DAY = 86_164.0905  # s
@@ -91,12 +92,12 @@ def rhs(t, s, m, p, o):
     if o.sun_and_moon + o.sunlight > 0.5:
         sx, sy, sz, mx, my, mz = ephemeris(p.sun_moon_time + t, o.tables, p.sun_moon)
         sun, moon = Vector(sx, sy, sz), Vector(mx, my, mz)
-    a = field(t, Vector(s.x, s.y, s.z), sun, moon, p.light / s.mass_left, p, o)
+    a = field(t, s, sun, moon, p.light / s.mass_left, p, o)
     flow, away = 0.0, 0.0
     if any_lane(abs(m.burn.ahead) > 0.0):
         push = Vector(m.burn.outward, m.burn.ahead, m.burn.across)
         by_mass = Vector(push.x / s.mass_left, push.y / s.mass_left, push.z / s.mass_left)
-        a = added(a, transposed_times(Matrix(*orbital_axes(s.x, s.y, s.z, s.vx, s.vy, s.vz)), by_mass))
+        a = added(a, transposed_times(ric_from_eci(s, Vector(s.vx, s.vy, s.vz)), by_mass))
         flow = -norm(push) / p.exhaust
     target_v, target_a = Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
     if o.phase == CHOICES.phase.inspection:

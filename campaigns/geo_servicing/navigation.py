@@ -17,9 +17,9 @@ from campaigns.geo_servicing.dynamics import MU, RATE
 from campaigns.geo_servicing.inputs import CHOICES
 from mc_engine.lanes import physics, replace, sincos, where
 from mc_engine.lanes.noise import normal_pair
-from mc_engine.physics.frames import orbital_axes
+from mc_engine.physics.earth_frames import ric_from_eci
 from mc_engine.physics.orbital_elements import equinoctial
-from mc_engine.physics.vectors import Matrix, Vector, added_scaled
+from mc_engine.physics.vectors import Vector, added_scaled
 
 Error = namedtuple("Error", "r s u w")
 EXACT = Error(0.0, 0.0, 0.0, 0.0)
@@ -147,8 +147,9 @@ def navigated_elements(s, e):
 
     r, u : outward;  s, w : ahead.
     """
-    axes = Matrix(*orbital_axes(s.x, s.y, s.z, s.vx, s.vy, s.vz))
+    true_v = Vector(s.vx, s.vy, s.vz)
+    axes = ric_from_eci(s, true_v)
     outward, ahead = Vector(axes.xx, axes.xy, axes.xz), Vector(axes.yx, axes.yy, axes.yz)
-    r = added_scaled(added_scaled(Vector(s.x, s.y, s.z), e.r, outward), e.s, ahead)
-    v = added_scaled(added_scaled(Vector(s.vx, s.vy, s.vz), e.u, outward), e.w, ahead)
+    r = added_scaled(added_scaled(s, e.r, outward), e.s, ahead)
+    v = added_scaled(added_scaled(true_v, e.u, outward), e.w, ahead)
     return equinoctial(r.x, r.y, r.z, v.x, v.y, v.z, MU)

@@ -10,8 +10,9 @@ from campaigns.geo_servicing.inspection import relative_orbit
 from campaigns.geo_servicing.navigation import EXACT
 from mc_engine.lanes import log, merged, physics, replace, where
 from mc_engine.model import Field, at_end, maximum_of, metrics, minimum_of, outputs
-from mc_engine.physics.frames import TURN, orbital_axes
-from mc_engine.physics.vectors import Matrix, Vector, matrix_times, norm, subtracted
+from mc_engine.physics.earth_frames import ric_from_eci
+from mc_engine.physics.frames import TURN
+from mc_engine.physics.vectors import Vector, matrix_times, norm, subtracted
 
 FAR = 1e9  # m, a range that is none
 NONE = float("nan")
@@ -101,8 +102,8 @@ def pair_of(s, o):
     """The module seen from the target [m], in its radial and transverse axes; missing in phases without a target."""
     if o.phase == CHOICES.phase.inspection:
         r, v = Vector(s.target_x, s.target_y, s.target_z), Vector(s.target_vx, s.target_vy, s.target_vz)
-        away = subtracted(Vector(s.x, s.y, s.z), r)
-        seen = matrix_times(Matrix(*orbital_axes(r.x, r.y, r.z, v.x, v.y, v.z)), away)
+        away = subtracted(s, r)
+        seen = matrix_times(ric_from_eci(r, v), away)
         true = relative_orbit(s, EXACT)
         return Pair(seen.y, seen.x, norm(away), true.drift, true.e)
     return Pair()

@@ -33,7 +33,7 @@ Memory = namedtuple("Memory", "met steering")
 # pressed, hottest: the moments of the largest dynamic pressure and heat rate; what has not come is not a number
 Met = namedtuple("Met", "pressed hottest lift exits pull_out first_exit")
 Lift = namedtuple("Lift", "cos_bank sin_bank rolls")  # present direction, and how often it was changed
-# by the names of the metrics
+# by the names of the metrics, SI
 PullOut = namedtuple("PullOut", "min_altitude min_altitude_time", defaults=(NAN, NAN))
 Exit = namedtuple(
     "Exit",
@@ -56,7 +56,7 @@ Air = namedtuple("Air", "density slope temperature v speed shear")
 # areas over mass [m^2/kg] of drag, lift, total load, load along the body axis and along the accelerometer's
 Force = namedtuple("Force", "drag lift total axial sensed")
 Exposure = namedtuple("Exposure", "place air force dynamic_pressure heat_rate")
-# a time, and outputs there
+# a time [s], and outputs there, SI
 Moment = namedtuple("Moment", "time altitude speed load axial_load dynamic_pressure heat_rate")
 
 

@@ -101,8 +101,6 @@ Metrics = metrics(
     limited_share=Field("share of the time with a torque at its limit", unit=""),
     final_alpha_deg=at_end("alpha_deg", "angle of attack error at the end"),
 )
-
-
 # states and outputs that both loops give, by their names
 Loops = namedtuple("Loops", "torque_pitch torque_roll bank_error lead_alpha lead_bank limited")
 
