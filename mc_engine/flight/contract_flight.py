@@ -12,8 +12,6 @@ import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from hashlib import sha256
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,11 +22,11 @@ from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.errors import EngineError
 from mc_engine.flight.compiled import CompiledFlyer
-from mc_engine.flight.flight import fly, fly_interpreted, grid_of
+from mc_engine.flight.flight import grid_of
 from mc_engine.flight.flyer import NOMINAL_NOISE
-from mc_engine.flight.kernel import build_kernel, clock_number
-from mc_engine.flight.kernel_parts import watching_events
+from mc_engine.flight.kernel import clock_number
 from mc_engine.flight.lost_numbers import not_finite
+from mc_engine.flight.missing_events import events_that_never_happen, why_no_stop
 from mc_engine.flight.repeatability import (
     Columns,
     first_difference,
@@ -40,15 +38,12 @@ from mc_engine.flight.repeatability import (
     results,
 )
 from mc_engine.garbage_collection import collect_rarely
-from mc_engine.lanes.kernel_cache import form_of, kept_or_made
 from mc_engine.model.faults import MORE, fault_of
-from mc_engine.model.fields import Event, FixedStep
-from mc_engine.model.phases import due_field, noted_field
+from mc_engine.model.fields import FixedStep
 from mc_engine.model.record import Model, compiled_model
 from mc_engine.model.trial import fixed_metrics
 from mc_engine.sampling.distributions import column, quantiles
 from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
-from mc_engine.suggestions import listed
 
 _CASES = 32
 _BLOCKS = 4  # of lanes that they fill at most
@@ -56,11 +51,9 @@ _BLOCKS = 4  # of lanes that they fill at most
 _PLACES = np.array([0.05, 0.8, 0.95])
 _PARTNERS = 4  # cases in which an input is tried that does nothing in the nominal case
 LONGEST_S = 10.0  # of the flight of one case: with it, all that is flown here takes some minutes
-_INTERPRETED_S = 10.0  # of the nominal case flown by Python: the kernel that it spares takes about as long to compile
 _NOMINAL = np.array([NOMINAL_NOISE])
 _GROSS = 0.1  # of the size of the states; halving changed sound steps by 0.03 at most, unstable ones by 1 to 100
 _ROUNDED = 1e-6  # of a step: a billion steps as numbers of 16 digits miss `until` by less
-_ZERO = 1e-6  # of an event function's reach: a flight that stops there has reached the zero
 
 
 def faults(campaign: Campaign) -> list[str]:
@@ -83,7 +76,7 @@ def faults(campaign: Campaign) -> list[str]:
             *_never_set(campaign, flown),
             *_always_the_same(campaign, flown),
             *_moving_nothing(campaign, inputs, ids),
-            *_never_crossing(campaign, inputs, ids, nominal),
+            *events_that_never_happen(campaign, inputs, ids, nominal),
         ]
     except EngineError as error:
         return [str(error).removesuffix(MORE)]
@@ -190,21 +183,8 @@ def _none_completing(campaign: Campaign, flown: Columns) -> Iterator[str]:
     reasons = [str(reason) for reason in flown["reason"] if reason]
     sentence = f"none of the first {status.size} cases completes: {counts.max()} are {word}"
     if word == "no-stop":
-        text = _no_stop(compiled_model(campaign.model))
+        text = why_no_stop(campaign)
     yield f"{sentence} ({reasons[0] if word == 'refused' and reasons else text})"
-
-
-def _no_stop(model: Model) -> str:
-    """What to look at where no case meets a stopping event; a delayed one by its own name."""
-    delayed = {due_field(event.name): event.name for event in model.event_list}
-    stops = [event.name for event in model.event_list if event.action == "stop"]
-    own = listed(delayed.get(name, name) for name in stops)
-    if not delayed.keys() & {*stops}:
-        happens, look_at = "crosses zero", "its direction"
-    else:
-        happens, look_at = "acts", "its direction, its delay `after`"
-    return (f"no stopping event {happens} before the time limit, of {own}; look at its function, {look_at} and the "
-            "clock's `until`")  # fmt: skip
 
 
 def _never_set(campaign: Campaign, flown: Columns) -> Iterator[str]:
@@ -268,99 +248,6 @@ def _trial_values(campaign: Campaign, dispersion: Dispersion) -> np.ndarray:
         return quantiles(dispersion.distribution, _PLACES)
     values = case_table(campaign, np.arange(min(campaign.cases, _CASES)))[dispersion.name]
     return np.sort(values)[[0, 3 * values.size // 4, -1]]
-
-
-def _never_crossing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, nominal: Columns) -> Iterator[str]:
-    """Events that fire in none of the cases, of which at least one completes: their functions keep one sign.
-
-    The nominal case counts, too: flown by Python it shows most events, and only for those that it leaves open a kernel
-    is compiled that watches them in all cases.
-    """
-    model = compiled_model(campaign.model)
-    stops = [event for event in model.event_list if event.action == "stop"]
-    # a case completes by a stopping event: the only one has happened
-    asked = [event for event in model.event_list if not event.rare and (event.action != "stop" or len(stops) > 1)]
-    if not asked:
-        return
-    watched = watching_events(model)
-    reached = _nominal_reach(campaign, watched) if nominal["status"][0] == STATUS_NAME[OK] else {}
-    if all(_happens(model, event, reached) for event in asked):
-        return
-    noise = np.append(ids, NOMINAL_NOISE)
-    both = {
-        name: np.append(np.broadcast_to(values, ids.size), campaign.nominal[name]) for name, values in inputs.items()
-    }
-    flown = fly(watched, both, noise, campaign.seed, folder=campaign.directory)
-    ok = flown["status"] == STATUS_NAME[OK]
-    reached = {metric.name: flown[metric.name][ok] for metric in watched.metrics}
-    for event in asked:
-        if not _happens(model, event, reached):
-            yield _never_happens(model, event, reached, int(ok[:-1].sum()))
-
-
-def _nominal_reach(campaign: Campaign, watched: Model) -> Columns:
-    """The metrics of `watching_events` in the nominal case, flown by Python; none where it takes too long or fails."""
-    flight = _KeptFlight(watched, campaign.directory)
-    try:
-        _, status, _, metrics = fly_interpreted(flight, campaign.nominal, NOMINAL_NOISE, campaign.seed)
-    except Exception:
-        return {}  # no finding: kernels go on where Python raises, and the kernel that watches is asked
-    return {metric.name: row for metric, row in zip(watched.metrics, metrics, strict=False)} if status[0] == OK else {}
-
-
-class _KeptFlight:
-    """Flies one case by Python and keeps its results in the cache.
-
-    They follow from the kernel, its arguments and the module that flies them, which name the file.
-    """
-
-    def __init__(self, model: Model, folder: Path | None):
-        self.model, self._folder = model, folder
-
-    def kernel(self, *arguments: Any) -> None:
-        inputs, results = arguments[:-7], arguments[-7:-3]  # last are the history, its rows and their pace
-
-        def flown() -> bytes:
-            from mc_engine.flight.interpreted import InterpretedFlight  # which loads the compiler
-
-            InterpretedFlight(self.model, _INTERPRETED_S).kernel(*arguments)
-            return b"".join(numbers.tobytes() for numbers in results)
-
-        by = Path(__file__).with_name("interpreted.py").read_bytes()
-        content = [(np.shape(given), np.asarray(given).tobytes()) for given in inputs]
-        digest = sha256(repr((by, content)).encode()).hexdigest()
-        compiled = build_kernel(self.model, self._folder, 1).file(form_of(arguments))
-        kept, _ = kept_or_made(compiled.with_suffix(f".{digest[:16]}.flight"), flown)
-        ends = np.cumsum([numbers.size for numbers in results])[:-1]
-        for numbers, values in zip(results, np.split(np.frombuffer(kept), ends), strict=True):
-            numbers[...] = values.reshape(numbers.shape)
-
-
-def _happens(model: Model, event: Event, reached: Columns) -> bool:
-    """Whether an event happens, or its function reaches zero, in any of the cases; not if there is no case.
-
-    reached : the metrics of `watching_events`.
-    """
-    if not reached:
-        return False
-    if model.phases:
-        return not np.isnan(reached[noted_field(event.name)]).all()
-    least, most = reached[f"least_{event.name}"], reached[f"most_{event.name}"]
-    zero = _ZERO * np.fmax(np.abs(least), np.abs(most))
-    return bool(((least <= zero) & (most >= -zero)).any())
-
-
-def _never_happens(model: Model, event: Event, reached: Columns, n_cases: int) -> str:
-    if model.phases:
-        return (
-            f'the event "{event.name}" happens in none of {n_cases} cases, in the phases that look for it; mend '
-            "its function or its direction, or declare it with rare=True if it is for unusual cases"
-        )
-    sign = "above" if (reached[f"least_{event.name}"] > 0.0).all() else "below"
-    return (
-        f'the event "{event.name}" crosses zero in none of {n_cases} cases, its function stays {sign} it; '
-        "mend the function, or declare it with rare=True if it is for unusual cases"
-    )
 
 
 def main() -> None:

@@ -1,8 +1,7 @@
 """What a kernel takes from its model: the physics, defaults for functions left out, and selections of fields."""
 
 from collections import namedtuple
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from functools import lru_cache
 from importlib import import_module
 from typing import Any, NamedTuple
@@ -12,8 +11,9 @@ from mc_engine.lanes.composed import ComposedFunction, Pick, blocks_in, made_by,
 from mc_engine.lanes.extrema import CORNER, EVENT, LAST, PEAK
 from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.kernel_data import Blocks, DataBlock
-from mc_engine.model.fields import DIRECTIONS, AdaptiveStep, Extremum, Field, FixedStep
-from mc_engine.model.phases import PHASE, noted_field
+from mc_engine.model.event_watch import watching_events
+from mc_engine.model.fields import DIRECTIONS, AdaptiveStep, Extremum, FixedStep
+from mc_engine.model.phases import PHASE
 from mc_engine.model.reading import ARGUMENTS
 from mc_engine.model.record import Model, NoMemory
 
@@ -196,47 +196,3 @@ def _tracked(
     names = [e.name for e in extrema]
     best_class = namedtuple("Best", names or ["unused"])  # type: ignore[misc]
     return [(place[e.name], _sign(e), 0.0) for e in extrema] or [(first_peak, 1.0, 0.0)], best_class
-
-
-# ---- to check that each event can occur
-
-
-@physics
-def _reached(t, s, m, p, o, best, when):
-    return best
-
-
-def watching_events(model: Model) -> Model:
-    """The same flight, with metrics `least_<event>` and `most_<event>`: the extremes of each event's function at the
-    steps; of a model with phases `time_of_<event>`, NaN where it did not happen.  The model must have events."""
-    assert model.events is not None
-    names = [event.name for event in model.event_list]
-    if model.noting is not None:
-        return _noting_events(model, model.noting())
-    kinds = [(f"{word}_{name}", name, kind) for name in names for word, kind in (("least", "min"), ("most", "max"))]
-    return replace(
-        model,
-        quantities=tuple(Field("the event's function", name=name, unit="") for name in names),
-        observe=model.events,
-        extrema=tuple(Extremum(name, event, kind, smooth=False) for name, event, kind in kinds),
-        metrics=tuple(Field("an extreme of an event's function", name=name, unit="") for name, _, _ in kinds),
-        evaluate=_reached,
-        figures=(),
-        published=(),
-        watching=True,
-    )
-
-
-def _noting_events(model: Model, functions: Mapping[str, Any]) -> Model:
-    names = [noted_field(event.name) for event in model.event_list if not event.rare]
-    memory = ARGUMENTS["evaluate"].split(", ").index("m")
-    picks: list[Pick] = [("argument", memory, name) for name in names]
-    return replace(
-        model,
-        **functions,
-        evaluate=ComposedFunction([], namedtuple("Times", names), picks),
-        metrics=tuple(Field("time of an event", name=name, unit="") for name in names),
-        figures=(),
-        published=(),
-        watching=True,
-    )

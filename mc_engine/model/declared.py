@@ -131,17 +131,6 @@ def model(
              for name, event in declared.items()}  # fmt: skip
     switch = _called("switch", switch, kept)
     start = _called("start", start, kept)
-
-    def functions(kept: Memory) -> dict[str, Any]:
-        return {
-            "rhs": kept.rhs(derivatives) if phases else derivatives[0],
-            "start": kept.start(start) if kept.kept else start,
-            "control": kept.control(controls) if kept.kept else controls[0],
-            "events": kept.watched(calls) if calls else None,
-            "switch": kept.switch(switch) if kept.kept else switch,
-            "note": kept.note(seen, outputs._fields),
-        }
-
     return Model(
         name=name,
         title=title,
@@ -154,13 +143,17 @@ def model(
         clock=clock,
         kernel_parameters=kernel_parameters,
         initial=_called("initial", initial, kept),
+        start=kept.start(start) if kept.kept else start,
+        rhs=kept.rhs(derivatives) if phases else derivatives[0],
+        control=kept.control(controls) if kept.kept else controls[0],
+        events=kept.watched(calls) if calls else None,
+        switch=kept.switch(switch) if kept.kept else switch,
+        note=kept.note(seen, outputs._fields),
         observe=seen,
         evaluate=_metrics(metrics, outputs, seen, evaluate, places, kept),
         prepare=prepare,
         event_list=kept.event_list(),
         phases=tuple(phases),
-        noting=(lambda: functions(kept.noting_all())) if phases else None,
-        **functions(kept),
         extrema=tracked,
         tables=tables,
         figures=figures,

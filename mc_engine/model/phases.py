@@ -73,7 +73,8 @@ def _moved(before, acted, after):
 
 
 @physics
-def _at_first(noted, first, hit, value):
+def at_first(noted, first, hit, value):
+    """What is noted of an event: `value` if it happens now and has not before, of which `first`, its time, tells."""
     return where((hit > 0.5) & (first != first), value, noted)
 
 
@@ -104,10 +105,6 @@ class Memory:
         self.kept |= {noted_field(*pair): _NAN for pair in self.values}
         self._own_fields = getattr(own, "_fields", ())
         self.record: Any = record_class("Memory", [*self._own_fields, *self.kept])
-
-    def noting_all(self) -> "Memory":
-        """The same, which notes the time of every event."""
-        return Memory(self.own, self.phases, self.events, [(name, "") for name in self.events])
 
     def handed(self, calls: list[Call], argument: str, time: int, memory: int) -> Pick:
         """What "since" or "phase" stands for, by calls that are added before that of the function which takes it.
@@ -256,7 +253,7 @@ class Memory:
         for event, symbol in [*self.values, *((name, "") for name in self.times)]:
             value: Pick = (*seen[:2], list(symbols).index(symbol)) if symbol else ("argument", _TIME, "")
             name, hit = noted_field(event, symbol), ("argument", _LAST, event)
-            now[name] = steps.add(_at_first, now[name], first[event], hit, value)
+            now[name] = steps.add(at_first, now[name], first[event], hit, value)
         return ComposedFunction(steps.calls, self.record, [*now.values()])
 
 

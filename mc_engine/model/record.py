@@ -73,7 +73,6 @@ class Model:
     note(t, s, m, p, o, hit) : the discrete state after an event, also one that ends the case; made by the engine
     event_list : tuple of Event, in the order of the components of `events`
     phases : tuple of str, the names of the phases, by the number that the discrete state holds
-    noting() : dict of functions of this record, with which the time of every event is noted; of a model with phases
     extrema : tuple of Extremum
     tables(o) : float64[n], see `model`
     watching : bool, set by the engine while it watches events
@@ -115,8 +114,7 @@ class Model:
     tables: Callable[..., np.ndarray] | None = None
     figures: tuple[Figure, ...] = ()
     data: tuple[str, ...] = ()
-    watching: bool = False  # see mc_engine.flight.kernel_parts.watching_events
-    noting: Callable[[], Mapping[str, Any]] | None = field(default=None, compare=False, repr=False)
+    watching: bool = False  # see mc_engine.model.event_watch.watching_events
     published: tuple[Mapping[str, Any], ...] = field(default=(), compare=False)
     reference: str = field(default="", compare=False)
     sources: Sources | None = field(default=None, compare=False, repr=False)  # of one that `load_model` gave

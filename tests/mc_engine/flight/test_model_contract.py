@@ -11,12 +11,13 @@ import pytest
 
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.errors import CampaignError
-from mc_engine.flight import contract_flight, repeatability
+from mc_engine.flight import missing_events, repeatability
 from mc_engine.flight.contract import breaches
-from mc_engine.flight.contract_flight import _nominal_reach, faults
+from mc_engine.flight.contract_flight import faults
 from mc_engine.flight.flight import fly
 from mc_engine.flight.interpreted import InterpretedFlight
-from mc_engine.flight.kernel_parts import watching_events
+from mc_engine.flight.missing_events import _nominal_times
+from mc_engine.model.event_watch import watching_events
 from tests.mc_engine.model.mistaken_campaign import campaign_with, given, in_front, line_of, with_evaluate
 from tests.mc_engine.store.small_run import ENVIRONMENT
 from tests.shipped_campaigns import samples
@@ -155,15 +156,51 @@ def test_a_switching_event_that_never_fires_is_missed_unless_it_is_declared_rare
     assert 'the event "moon" crosses zero in none of 32 cases, its function stays below it' in missed
 
 
-def switching_half_way(folder, place="s.x"):
-    """A right campaign with an event that happens: where `place` falls through zero."""
+def switching_half_way(folder, place="s.x", direction="falling"):
+    """A campaign with an event that happens, if its direction is right: `place` falls through zero."""
     edits = [
         in_front(f"@physics\ndef half_way(s):\n    return {place}"),
         in_front("@physics\ndef switch(s, m):\n    return s, m"),
         given("switch=switch"),
     ]
     stop = '"apogee": Event(climb, "falling", "stop")'
-    return campaign_with(folder, *edits, (stop, f'{stop}, "half_way": Event(half_way, "falling", "switch")'))
+    return campaign_with(folder, *edits, (stop, f'{stop}, "half_way": Event(half_way, "{direction}", "switch")'))
+
+
+OTHER_WAY = (
+    'model.py, line {}: the event "{}" crosses zero falling at {} s in the nominal case, but its direction is "rising"'
+)
+MEND = 'give it the direction "falling" or "either", or its function the other sign'
+
+
+def test_an_event_whose_direction_never_comes_is_named_with_its_line_the_time_and_the_fix(tmp_path):
+    sentence = only(faults(switching_half_way(tmp_path, direction="rising")))
+    crossing = OTHER_WAY.format(line_of(tmp_path, "MODEL = model(") + 2, "half_way", 1366)
+    assert sentence.startswith(f"{crossing}, in which it happens in none of 32 cases; {MEND}, or declare it with rare")
+    assert faults(switching_half_way(tmp_path / "either", direction="either")) == []
+
+
+CLIMB = "return s.x * s.vx + s.y * s.vy"
+
+
+@pytest.mark.parametrize("after", ["", ", after=3.0"])
+def test_a_stopping_event_of_the_wrong_direction_is_named_where_all_cases_reach_the_time_limit(tmp_path, after):
+    edits = [(CLIMB, "return s.x"), ('"falling", "stop")', f'"rising", "stop"{after})'), ("10_000.0", "3000.0")]
+    sentence = only(faults(campaign_with(tmp_path, *edits)))
+    crossing = OTHER_WAY.format(line_of(tmp_path, "MODEL = model(") + 2, "apogee", 1366)
+    assert f"32 are no-stop (no stopping event happens before the time limit: {crossing}; {MEND})" in sentence
+
+
+def test_an_event_that_a_flight_ends_at_has_happened_and_one_that_leaves_zero_has_not(tmp_path):
+    """The flight stops where s.x falls through zero: the other function is above zero there, by its rounding."""
+    edits = [(CLIMB, "return s.x"), in_front("@physics\ndef switch(s, m):\n    return s, m"), given("switch=switch")]
+    stop = '"apogee": Event(climb, "falling", "stop")'
+    for name, function, direction in (("at_end", "s.x + 1e-6", "falling"), ("leaves", "s.y", "rising")):
+        event = [in_front(f"@physics\ndef {name}(s):\n    return {function}")]
+        event += [(stop, f'{stop}, "{name}": Event({name}, "{direction}", "switch")')]
+        found = faults(campaign_with(tmp_path / name, *edits, *event))
+        assert name == "at_end" or f'the event "{name}" crosses zero in none of' in only(found)
+        assert name == "leaves" or found == []
 
 
 def test_a_right_model_is_checked_with_the_kernel_of_its_run_alone(tmp_path, monkeypatch):
@@ -174,7 +211,7 @@ def test_a_right_model_is_checked_with_the_kernel_of_its_run_alone(tmp_path, mon
         flown.append(model)
         return fly(model, *arguments, **options)
 
-    for module in (contract_flight, repeatability):
+    for module in (missing_events, repeatability):
         monkeypatch.setattr(module, "fly", noted)
     assert faults(campaign) == []
     assert flown
@@ -191,14 +228,14 @@ def test_python_flies_the_nominal_case_of_a_model_and_its_inputs_once(tmp_path, 
         kernel(flight, *arguments)
 
     monkeypatch.setattr(InterpretedFlight, "kernel", noted)
-    reached = [_nominal_reach(campaign, watching_events(campaign.model)) for _ in range(2)]
+    times = [_nominal_times(campaign, watching_events(campaign.model)) for _ in range(2)]
     assert len(by_python) == 1
-    assert reached[0] == reached[1]
-    assert reached[0]["least_half_way"] < 0.0 < reached[0]["most_half_way"]
+    assert times[0] == times[1]
+    assert 0.0 < times[0]["time_of_half_way"] < times[0]["time_of_apogee"]
     higher = replace(campaign, nominal={**campaign.nominal, "altitude_km": 500.0})
-    assert _nominal_reach(higher, watching_events(higher.model)) != reached[0]
+    assert _nominal_times(higher, watching_events(higher.model)) != times[0]
     beyond = switching_half_way(tmp_path / "beyond", "s.x - 1.0")
-    assert _nominal_reach(beyond, watching_events(beyond.model))["most_half_way"] == reached[0]["most_half_way"] - 1.0
+    assert _nominal_times(beyond, watching_events(beyond.model))["time_of_half_way"] < times[0]["time_of_half_way"]
     assert len(by_python) == 3
 
 
