@@ -147,7 +147,7 @@ def injected(t, s, m, p, o):
 
 EVENTS = {
     "ignite": Event(ignition, "rising", "switch"),
-    "next_segment": Event(next_segment, "rising", "switch"),
+    "next_segment": Event(next_segment, "rising", "switch", rare=True),
     "shut_down": Event(shut_down, "rising", "switch"),
     "burn_out": Event(burn_out, "rising", "switch", rare=True),
     "injected": Event(injected, "rising", "stop"),

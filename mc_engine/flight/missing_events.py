@@ -25,7 +25,7 @@ from mc_engine.suggestions import listed
 
 _INTERPRETED_S = 10.0  # of the nominal case flown by Python: the kernel that it spares takes about as long to compile
 _LOOKED_AT = 5  # flights whose event functions are looked at: the nominal case and some others
-_ZERO = 1e-6  # of an event function's reach: a flight that stops there has reached the zero
+_ZERO = 1e-6  # of an event function's reach: a flight that comes or ends as near has reached the zero
 _OTHER = {"rising": "falling", "falling": "rising"}
 Looks = dict[str, Columns]  # by the case in words, its times and event functions
 
@@ -133,14 +133,14 @@ def _looks(campaign: Campaign, watched: Model, cases: Mapping[str, np.ndarray], 
 
 
 def _never_happens(model: Model, event: Event, looks: Looks, n_cases: int) -> str:
-    """The sentence on an event; "" where a flight without phases ends at its zero."""
+    """The sentence on an event; "" where a flight without phases comes to its zero, such as one that ends there."""
     if other := _other_way(model, event, looks):
         return (f"{other}, in which it happens in none of {n_cases} cases; {_mended(event)}, or declare it with "
                 "rare=True if it is for unusual cases")  # fmt: skip
-    functions = [look[event.name] for look in looks.values()]
-    if not model.phases and any(abs(values[-1]) <= _ZERO * np.abs(values).max() for values in functions):
+    sizes = [np.abs(look[event.name]) for look in looks.values()]
+    if not model.phases and any(size.min() <= _ZERO * size.max() for size in sizes):
         return ""
-    values = np.concatenate([*functions, np.empty(0)])
+    values = np.concatenate([*(look[event.name] for look in looks.values()), np.empty(0)])
     if model.phases or ((values < 0.0).any() and (values > 0.0).any()):
         within = ", in the phases that look for it" if model.phases else ""
         return (f'the event "{event.name}" happens in none of {n_cases} cases{within}; mend its function or its '
