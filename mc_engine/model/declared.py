@@ -213,6 +213,8 @@ def _memory(
     memory: Any, start: Any, phases: Mapping[str, Phase], events: Mapping[str, Event], metrics: Any, outputs: Any
 ) -> Memory:
     """The discrete state with what the engine keeps in it for phases, delayed events and metrics at events."""
+    if memory is not None and not isinstance(memory, type):
+        raise ModelError(f"`memory` is {memory!r}; hand over its class, memory=Memory")
     symbols = {item.name: item.symbol for item in outputs.declared}
     noted = []
     for name, metric in metrics.computed.items():
@@ -316,6 +318,9 @@ def _extrema(metrics: Any, outputs: Any, named: Mapping[str, Metric]) -> tuple[t
         tracked[metric.extremum] = key
     for name, metric in metrics.computed.items():
         output = metric.output or getattr(metric.extremum, "quantity", _TIME.name)
+        if not isinstance(output, str):
+            raise ModelError(f'metric "{name}" is of the output {output!r}; the name of an output comes first, such as '
+                             f'"{next(iter(known))}"')  # fmt: skip
         if output not in known:
             raise ModelError(f'metric "{name}": there is no output "{output}"{hint(output, known)}')
         if output == _TIME.name and metric.source not in ("end", "event"):

@@ -19,6 +19,7 @@ from typing import Any
 
 from mc_engine.errors import EngineError, ModelError
 from mc_engine.lanes.number import Origin
+from mc_engine.lanes.philox import Draws
 from mc_engine.suggestions import hint, nearest
 from mc_engine.units import UNITS, unit_suffix
 
@@ -35,6 +36,11 @@ _EACH_CASE = (
 _OF_ARRAYS = re.compile(
     "truth value of an array|integer scalar arrays|interpreted as an integer|only (length-1|0-dimensional) arrays|"
     "must be real number, not|__round__|ind(ex|ices) must be integers|used as indices|boolean index"
+)
+# what functions of a model are handed, by the names that they take
+_HANDED = (
+    *("t", "s", "m", "p", "o", "draws", "hit", "best", "when", "since", "phase"),
+    *("time", "state", "memory", "parameters", "settings"),
 )
 _LEFT_OUT = re.compile(r"(\w+)\.__new__\(\) missing \d+ required positional arguments?: (.*)")
 _UNKNOWN_FIELD = re.compile(r"(\w+)\.__new__\(\) got an unexpected keyword argument '(\w+)'")
@@ -83,7 +89,7 @@ def fault_of_trial(error: Exception) -> str:
     elif unknown := _UNKNOWN_FIELD.match(text):
         text = f'{unknown[1]}(...) has no field "{unknown[2]}"{_hint_of_field(error, unknown[1], unknown[2])}'
     elif not isinstance(error, EngineError):  # which says the fix itself
-        text = f"{type(error).__name__}: {_ARRAY.sub('a number', text)}{_hint_of_attribute(error) or f'; {PHYSICS}'}"
+        text = f"{type(error).__name__}: {_ARRAY.sub('a number', text)}{_hint_of_name(error) or f'; {PHYSICS}'}"
     return f"{source_place(frame.f_code.co_filename, line) if frame else 'the model'}: {text}"
 
 
@@ -95,8 +101,22 @@ def _hint_of_field(error: Exception, record: str, field: str) -> str:
     return hint(field, getattr(made, "_fields", ()))
 
 
+def _hint_of_name(error: Exception) -> str:
+    """What to do about a name that is not known, or an unknown field."""
+    if not isinstance(error, NameError):
+        return _hint_of_attribute(error)
+    from mc_engine import lanes  # which loads the compiler
+
+    frame, _ = frame_in_model(error)
+    if error.name in _HANDED and frame:
+        return f"; a function takes what it names: write `{error.name}` among the arguments of `{frame.f_code.co_name}`"
+    return "; import it from mc_engine.lanes" if error.name in lanes.__all__ else ""
+
+
 def _hint_of_attribute(error: Exception) -> str:
     """What an unknown field of a record was meant to be: that of a column, which physics has without its unit."""
+    if isinstance(error, AttributeError) and isinstance(error.obj, Draws):
+        return "; for noise hand it to normal_pair(draws, index) of mc_engine.lanes.noise"
     if not isinstance(error, AttributeError) or not hasattr(error.obj, "_fields"):
         return ""
     name, known = str(error.name), error.obj._fields

@@ -295,6 +295,9 @@ def events_of(phases: Mapping[str, Phase], events: Mapping[str, Event]) -> dict[
     for name, phase in phases.items():
         if not isinstance(phase, Phase):
             raise ModelError(f'the phase "{name}" is {phase!r}; declare it so: "{name}": Phase(rhs=..., events=...)')
+        if isinstance(phase.control, Mapping):
+            raise ModelError(f'the phase "{name}" has a dictionary as its control; say what it is: '
+                             "Phase(rhs, events={...})")  # fmt: skip
     all_events = dict(events)
     for name, phase in phases.items():
         for event_name, event in checked_events(phase.events).items():

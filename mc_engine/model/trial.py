@@ -341,6 +341,9 @@ def _refuse_other_than_numbers(function: Callable[..., Any], name: str, result: 
 
 def _part_giving(function: Any, field: str) -> Callable[..., Any]:
     """The function that gives a field of the result of another, which may be composed of several."""
+    if isinstance(function, Alternatives):  # of phases: in those that do not look for an event it is a constant
+        found = ((part, _part_giving(part, field)) for part in function.parts)
+        return next((giving for part, giving in found if giving is not part), function)
     fields = getattr(getattr(function, "record", None), "_fields", ())
     source, index, _ = function.picks[fields.index(field)] if field in fields else ("", 0, "")
     return _part_giving(function.calls[index][0], field) if source == "result" else function

@@ -115,7 +115,10 @@ def _named_numbers() -> Iterator[dict[str, float]]:
     try:
         yield named
     finally:
-        sys.setprofile(before)
+        if hasattr(before, "enable"):  # of cProfile, which is no function
+            before.enable()
+        else:
+            sys.setprofile(before)
 
 
 def _numbers(name: str, value: Any) -> Iterator[tuple[str, float]]:

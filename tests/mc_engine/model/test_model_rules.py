@@ -1,6 +1,8 @@
 """Records of a model that contradict themselves or one another: named where the model is made."""
 
-from mistaken_campaign import given, refused, with_evaluate, with_input
+from mistaken_campaign import campaign_with, given, in_front, refused, with_evaluate, with_input
+
+from mc_engine.flight.contract import breaches
 
 IMPORTS = "from mc_engine.lanes import"
 CLOCK = "FixedStep(step=10.0, until=10_000.0)"
@@ -38,6 +40,12 @@ CONTRADICTIONS = {
                                        'the output "t_s" has the name of a column that every table has'),
     "parameters of no record": (given("kernel_parameters=dict"), "kernel_parameters must be a named tuple, whose"),
     "control without a memory": (given("control=rhs"), "the model has `control`, but no `memory`; give memory=Memory"),
+    "memory of one case": (given("memory=Outputs(1.0, 2.0)"),
+                           "`memory` is Outputs(altitude=1.0, speed=2.0); hand over its class, memory=Memory"),
+    "level before output": (('maximum_of("speed_m_s", "largest speed")', 'last_above(0.5, "speed_m_s")'),
+                            ("maximum_of", "last_above"), ('top_speed_m_s', 'top_speed_s'),
+                            'metric "top_speed_s" is of the output 0.5; the name of an output comes first, such as '
+                            '"altitude_km"'),
     "default of nobody": (*with_input('law=Setting("c", "law", choices=("a", "b"))'),
                           'setting "law" has the default \'c\'; known are "a", "b"'),
     "a text as a default": (("300.0,", '"300",'), "\"altitude_km\" has '300' as its `default`; it must"),
@@ -52,6 +60,19 @@ CONTRADICTIONS = {
 def test_a_contradiction_is_named_where_the_model_is_made(tmp_path):
     for mistake, (*edits, sentence) in CONTRADICTIONS.items():
         refused(tmp_path / mistake, edits, sentence, "MODEL = model(")
+
+
+def test_a_name_that_physics_does_not_know_gets_its_fix(tmp_path):
+    memory = in_front("from collections import namedtuple\n\nMemory = namedtuple('Memory', 'a', defaults=(0.0,))")
+    for number, (arguments, result, sentence) in enumerate([
+        ("draws", "draws.normal()", "for noise hand it to normal_pair(draws, index) of mc_engine.lanes.noise"),
+        ("s", "draws.key", "a function takes what it names: write `draws` among the arguments of `control`"),
+        ("s", "exp(s.x)", "name 'exp' is not defined; import it from mc_engine.lanes"),
+    ]):  # fmt: skip
+        control = in_front(f"@physics\ndef control({arguments}):\n    return Memory(a={result})")
+        edits = [control, memory, given("memory=Memory", "control=control")]
+        (found,) = breaches(campaign_with(tmp_path / str(number), *edits))
+        assert found.endswith(sentence)
 
 
 VY, ALTITUDE = 'vy_m_s="vy", class_m="more"', 'altitude_km="altitude", lambda_m="more"'

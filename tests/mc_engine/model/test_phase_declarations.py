@@ -25,6 +25,8 @@ MISTAKES = {
     "rhs beside phases": (("observe=observe", "rhs=rhs, observe=observe"),
                           "the model has both `rhs` and `phases`; each phase has its own: Phase(rhs=...)"),
     "events beside phases": (("observe=observe", "events={}, observe=observe"), "both `events` and `phases`"),
+    "events as control": (('"near": Phase(rhs, events=', '"near": Phase(rhs, '),
+                          'the phase "near" has a dictionary as its control; say what it is: Phase(rhs, events={...})'),
     "neither": (('phases={"near"', 'data=()) and dict(x={"near"'), "the model has no `rhs`"),
     "no phase": (('"near": Phase(rhs, ', '"near": dict(rhs=rhs, '), 'the phase "near" is {'),
     "stop and phase": (('"rising", to=', '"rising", "stop", to='), 'has the action "stop" and begins the phase "away"'),
@@ -56,6 +58,8 @@ def test_a_mistake_in_phases_is_named_with_its_fix(tmp_path):
 
 
 IN_PHYSICS = {
+    "truth of a delayed event": (('to="away"', 'to="away", after=1.0'), (" - (7e6) ** 2", " > (7e6) ** 2"),
+                                 'model.py, line 38: `events` gives a truth value for "far"; it must give a number'),
     "rhs of the second phase": (("def height", "def lost(s):\n    return s.x\n\n\n@physics\ndef height"),
                                 ('"away": Phase(rhs', '"away": Phase(lost'), "`rhs` gives "),
     "syntax of the second phase": (("def height", "def lost(s):\n    return [s.x]\n\n\n@physics\ndef height"),

@@ -1,3 +1,4 @@
+import cProfile
 from dataclasses import replace
 
 import numpy as np
@@ -75,6 +76,14 @@ def test_a_trace_has_every_number_that_the_physics_names_at_every_step(run):
     assert trace["altitude_km"].iloc[-1] == pytest.approx(case.metrics["apogee_altitude_km"], rel=1e-15)
     assert (trace.attrs["units"]["altitude_km"], trace.attrs["units"]["rhs.g"]) == ("km", "")
     assert (trace["initial.dv"] == trace["initial.dv"][0]).all()
+
+
+def test_a_trace_is_the_same_under_a_profiler_which_goes_on(run):
+    with cProfile.Profile() as profile:
+        trace = run.case(17).trace()
+        load_campaign("minimal", cases=2)
+    assert trace.equals(run.case(17).trace())
+    assert "load_campaign" in {getattr(entry.code, "co_name", "") for entry in profile.getstats()}
 
 
 def test_a_trace_names_functions_inside_functions_and_fields_of_records(tmp_path):
