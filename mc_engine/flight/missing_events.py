@@ -12,9 +12,9 @@ from mc_engine.campaign.loading import Campaign
 from mc_engine.flight.flight import fly, fly_histories, fly_interpreted
 from mc_engine.flight.flyer import NOMINAL_NOISE
 from mc_engine.flight.kernel import build_kernel
+from mc_engine.flight.kernel_parts import watching_events
 from mc_engine.flight.repeatability import Columns
 from mc_engine.lanes.kernel_cache import form_of, kept_or_made
-from mc_engine.model.event_watch import watching_events
 from mc_engine.model.fields import Event
 from mc_engine.model.phases import due_field, noted_field
 from mc_engine.model.reading import code_of, place_of
@@ -129,7 +129,7 @@ def _looks(campaign: Campaign, watched: Model, cases: Mapping[str, np.ndarray], 
     flights = fly_histories(watched, few, noise, campaign.seed, folder=campaign.directory)
     who = ["the nominal case", *(f"case {case}" for case in noise[1:])]
     flown = zip(who, flights, strict=True)
-    return {name: columns | history for name, (columns, history) in flown if history["t_s"].size}
+    return {name: history for name, (_, history) in flown if history["t_s"].size}
 
 
 def _never_happens(model: Model, event: Event, looks: Looks, n_cases: int) -> str:
@@ -151,10 +151,11 @@ def _never_happens(model: Model, event: Event, looks: Looks, n_cases: int) -> st
 
 
 def _other_way(model: Model, event: Event, looks: Looks) -> str:
-    """Where an event's function crosses zero against the event's direction, which it never does; "" if nowhere."""
+    """Where an event's function crosses zero against the event's direction, and in that never; "" if nowhere."""
     for who, look in looks.items():
-        t = _time_of_crossing(look["t_s"], look[event.name], _OTHER.get(event.direction, ""))
-        if not np.isnan(t) and np.isnan(look[noted_field(event.name)][0]):
+        own, t = (_time_of_crossing(look["t_s"], look[event.name], way)
+                  for way in (event.direction, _OTHER.get(event.direction, "")))  # fmt: skip
+        if np.isnan(own) and not np.isnan(t):
             return (f'{_place(model, event)}: the event "{event.name}" crosses zero {_OTHER[event.direction]} at '
                     f'{t:.4g} s in {who}, but its direction is "{event.direction}"')  # fmt: skip
     return ""

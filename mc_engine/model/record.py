@@ -114,7 +114,7 @@ class Model:
     tables: Callable[..., np.ndarray] | None = None
     figures: tuple[Figure, ...] = ()
     data: tuple[str, ...] = ()
-    watching: bool = False  # see mc_engine.model.event_watch.watching_events
+    watching: bool = False  # see mc_engine.flight.kernel_parts.watching_events
     published: tuple[Mapping[str, Any], ...] = field(default=(), compare=False)
     reference: str = field(default="", compare=False)
     sources: Sources | None = field(default=None, compare=False, repr=False)  # of one that `load_model` gave

@@ -115,8 +115,9 @@ def _named_numbers() -> Iterator[dict[str, float]]:
     try:
         yield named
     finally:
-        if hasattr(before, "enable"):  # of cProfile, which is no function
-            before.enable()
+        enable = getattr(before, "enable", None)  # of cProfile, which is no function
+        if enable:
+            enable()
         else:
             sys.setprofile(before)
 

@@ -16,8 +16,8 @@ from mc_engine.flight.contract import breaches
 from mc_engine.flight.contract_flight import faults
 from mc_engine.flight.flight import fly
 from mc_engine.flight.interpreted import InterpretedFlight
+from mc_engine.flight.kernel_parts import watching_events
 from mc_engine.flight.missing_events import _nominal_times
-from mc_engine.model.event_watch import watching_events
 from tests.mc_engine.model.mistaken_campaign import campaign_with, given, in_front, line_of, with_evaluate
 from tests.mc_engine.store.small_run import ENVIRONMENT
 from tests.shipped_campaigns import samples
