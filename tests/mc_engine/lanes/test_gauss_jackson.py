@@ -135,8 +135,10 @@ def added(total, change):
     return end, (end - total) - change
 
 
-@pytest.mark.parametrize("order", [6, 9])
-@pytest.mark.parametrize("width", [1, 8])
+@pytest.mark.parametrize(
+    ("order", "width"),
+    [(6, 8), (9, 1), pytest.param(6, 1, marks=pytest.mark.slow), pytest.param(9, 8, marks=pytest.mark.slow)],
+)
 def test_a_plain_loop_over_python_floats_gives_the_same_bits(order, width):
     columns = flown(by(OSCILLATOR, f"gj{order}"), width=width, seed=9, **MIXED)
     for case in range(0, 21, 4):

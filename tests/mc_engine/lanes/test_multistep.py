@@ -88,8 +88,10 @@ class AdamsSteps:
         return end
 
 
-@pytest.mark.parametrize("order", [8, 11])
-@pytest.mark.parametrize("width", [1, 8])
+@pytest.mark.parametrize(
+    ("order", "width"),
+    [(8, 1), (11, 8), pytest.param(8, 8, marks=pytest.mark.slow), pytest.param(11, 1, marks=pytest.mark.slow)],
+)
 def test_a_plain_loop_over_python_floats_gives_the_same_bits(order, width):
     columns = flown(by(OSCILLATOR, f"abm{order}"), width=width, seed=9, **MIXED)
     for case in range(0, 21, 4):

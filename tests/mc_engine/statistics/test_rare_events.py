@@ -53,7 +53,11 @@ LIMIT_STATES = {
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", LIMIT_STATES)
+@pytest.mark.parametrize(
+    "name",
+    ["a plane", "four branches", "outside a sphere"]
+    + [pytest.param(name, marks=pytest.mark.slow) for name in ("a plane of 20 inputs", "a sum of exponentials")],
+)
 def test_known_probabilities_are_met_without_bias_and_inside_the_interval(method, name):
     margin, n_inputs, p = LIMIT_STATES[name]
     estimate, cases = METHODS[method]
