@@ -13,29 +13,31 @@ from reports.formats.html import render_html
 from reports.formats.json_data import FILE as JSON
 from reports.formats.json_data import render_json
 from reports.formats.markdown import FILE, figure_files, render_markdown
-from reports.formats.pdf import render_pdf
+from reports.formats.pdf import typeset, typst_input
 from reports.run.flown import Flown
 from reports.user_sections.sections import RunFacts, TemplateError, run_facts, with_own_sections
 
-
-def _html(document: Document) -> list[Attachment]:
-    return [Attachment("report.html", render_html(document))]
+Rendering = Callable[[], list[Attachment]]  # the first file is the report, the others belong to it
 
 
-def _pdf(document: Document) -> list[Attachment]:
-    return [Attachment("report.pdf", render_pdf(document))]
+def _html(document: Document) -> Rendering:
+    return lambda: [Attachment("report.html", render_html(document))]
 
 
-def _json(document: Document) -> list[Attachment]:
-    return [Attachment(JSON, render_json(document))]
+def _pdf(document: Document) -> Rendering:
+    content = typst_input(document)  # at once: typst takes longest, and leaves the interpreter to the others
+    return lambda: [Attachment("report.pdf", typeset(content))]
 
 
-def _markdown(document: Document) -> list[Attachment]:
-    return [Attachment(FILE, render_markdown(document)), *figure_files(document)]
+def _json(document: Document) -> Rendering:
+    return lambda: [Attachment(JSON, render_json(document))]
 
 
-# The first file of each is the report, the others belong to it.
-FORMATS: dict[str, Callable[[Document], list[Attachment]]] = {
+def _markdown(document: Document) -> Rendering:
+    return lambda: [Attachment(FILE, render_markdown(document)), *figure_files(document)]
+
+
+FORMATS: dict[str, Callable[[Document], Rendering]] = {
     "html": _html,
     "pdf": _pdf,
     "md": _markdown,
@@ -62,9 +64,9 @@ def write_reports(
     path = Path(run_path)
     document = _document(path, Path(template) if template else None, [Path(other) for other in beside])
     written, kept = [], derived_files(path)
-    wanted = [FORMATS[name] for name in dict.fromkeys(formats)]
-    with ThreadPoolExecutor() as pool:  # typst, which makes the PDF, leaves the interpreter to the others
-        for files in pool.map(lambda render: render(document), wanted):
+    renderings = [FORMATS[name](document) for name in dict.fromkeys(formats)]
+    with ThreadPoolExecutor() as pool:
+        for files in pool.map(lambda render: render(), renderings):
             kept.write({file.name: file.content for file in files}, alone_in=FIGURES if files[1:] else None)
             written.append(path / files[0].name)
     if "json" not in formats:

@@ -38,21 +38,19 @@ def build(run: Run, name: str) -> Document:
     own = Flown(run, name)
     flown = ShownRun(own)
     landing = footprint_contents(own)
-    sections = tuple(_kept([*_chapters(flown, landing), *_appendices(flown)]))
-    return numbered(
-        Document(
-            title=titled(flown),
-            subtitle=summary_sentence(flown),
-            created=str(flown.manifest.get("created_utc", "")),
-            facts=campaign_facts(flown),
-            verdicts=verdict_cards(flown),
-            costs=cost_cards(flown),
-            warnings=warnings(flown),
-            sections=sections,
-            files=tuple(landing.files),
-            cases=case_data(flown, sections),
-            data=run_data(own),
-        )
+    sections = numbered(_kept([*_chapters(flown, landing), *_appendices(flown)]))
+    return Document(
+        title=titled(flown),
+        subtitle=summary_sentence(flown),
+        created=str(flown.manifest.get("created_utc", "")),
+        facts=campaign_facts(flown),
+        verdicts=verdict_cards(flown),
+        costs=cost_cards(flown),
+        warnings=warnings(flown),
+        sections=sections,
+        files=tuple(landing.files),
+        cases=case_data(flown, sections),
+        data=run_data(own),
     )
 
 

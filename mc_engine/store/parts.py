@@ -236,7 +236,8 @@ def read_part(run: Path, part: Part, columns: Sequence[Column] | None = None) ->
         table = parquet_table(content, names)
     except ValueError as error:
         raise StoreError(f"{path}: {error}{advice}") from None
-    if missing := [name for name in names or () if name not in table.column_names]:
+    present = set(table.column_names)
+    if missing := [name for name in names or () if name not in present]:
         named = "; ".join(f'the column "{name}" is missing' for name in missing)
         raise StoreError(f"{path}: {named}{advice}")
     if table.num_rows != part.rows or not (columns is None or table.schema.equals(arrow_schema(columns))):

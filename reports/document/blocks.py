@@ -192,12 +192,12 @@ def _cleaned(value: Any) -> Any:
     return value
 
 
-def numbered(document: Document) -> Document:
-    """The document with its sections, tables and figures numbered in reading order."""
+def numbered(said: Iterable[Section]) -> tuple[Section, ...]:
+    """Sections of a document with their chapters, tables and figures numbered in reading order."""
     counts: dict[type, int] = {Table: 0, FigureBlock: 0}
     numbers = {"chapter": map(str, count(1)), "appendix": iter(ascii_uppercase)}
     sections = []
-    for section in document.sections:
+    for section in said:
         blocks: list[Block] = []
         for block in section.blocks:
             if isinstance(block, Table | FigureBlock):
@@ -206,7 +206,7 @@ def numbered(document: Document) -> Document:
             blocks.append(block)
         number = next(numbers[section.kind]) if section.kind in numbers else ""
         sections.append(replace(section, blocks=tuple(blocks), number=number))
-    return replace(document, sections=tuple(sections))
+    return tuple(sections)
 
 
 def as_blocks(said: Found) -> tuple[Block, ...]:

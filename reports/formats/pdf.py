@@ -20,13 +20,19 @@ KINDS = {Text: "text", Terms: "terms", Table: "table", FigureBlock: "figure"}
 
 
 def render_pdf(document: Document) -> bytes:
-    """The PDF.  Its creation date is that of the run.
+    """The PDF.  Its creation date is that of the run."""
+    return typeset(typst_input(document))
 
-    All text reaches typst as JSON strings, which it never reads as markup.
-    """
+
+def typst_input(document: Document) -> str:
+    """All that typst is given: its text as JSON strings, which it never reads as markup, and figures as SVG."""
+    return json.dumps(_plain_document(document), ensure_ascii=False, allow_nan=False)
+
+
+def typeset(content: str) -> bytes:
+    """The PDF of a `typst_input`.  Other threads run meanwhile."""
     if time.time() < 0.0:  # typst asks for it, and panics
         raise EngineError("the clock of this computer stands before 1970, with which no PDF is made; set it")
-    content = json.dumps(_plain_document(document), ensure_ascii=False, allow_nan=False)
     with as_file(files("reports").joinpath("templates")) as templates:
         return typst.compile(
             str(templates / "report.typ"),

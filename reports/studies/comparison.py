@@ -102,21 +102,17 @@ def build_comparison(comparison: Comparison, runs: tuple[Run, Run] | None = None
         Section("campaign", "Changes in the campaign", as_blocks(_campaign_blocks(comparison))),
         Section("reading", "Glossary", (GLOSSARY,)),
     )
-    return numbered(
-        Document(
-            kind="Comparison of two runs",
-            question="Changes",
-            title=comparison.titles[1]
-            if comparison.titles[0] == comparison.titles[1]
-            else " and ".join(comparison.titles),
-            subtitle=_change_sentence(comparison),
-            created=comparison.created[1],
-            facts=_run_facts(comparison),
-            verdicts=tuple(_change_cards(comparison)),
-            costs=(),
-            warnings=_comparison_warnings(comparison),
-            sections=tuple(section for section in sections if section.blocks),
-        )
+    return Document(
+        kind="Comparison of two runs",
+        question="Changes",
+        title=comparison.titles[1] if comparison.titles[0] == comparison.titles[1] else " and ".join(comparison.titles),
+        subtitle=_change_sentence(comparison),
+        created=comparison.created[1],
+        facts=_run_facts(comparison),
+        verdicts=tuple(_change_cards(comparison)),
+        costs=(),
+        warnings=_comparison_warnings(comparison),
+        sections=numbered(section for section in sections if section.blocks),
     )
 
 

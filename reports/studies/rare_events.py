@@ -99,18 +99,16 @@ def build_rare_event(record: RareEventRecord, name: str) -> Document:
         Section("provenance", "Provenance", (origin_table("estimate", name, record.record, _asked(record)),)),
         Section("reading", "Glossary", (GLOSSARY,)),
     )
-    return numbered(
-        Document(
-            kind="Rare-event report",
-            title=str(campaign.get("title") or name),
-            subtitle=_estimate_sentence(result),
-            created=str(record.record.get("created_utc", "")),
-            facts=_estimate_facts(record),
-            verdicts=(_verdict_card(result),),
-            costs=tuple(_cost_cards(result)),
-            warnings=tuple(map(spelled, result["remarks"])),
-            sections=sections,
-        )
+    return Document(
+        kind="Rare-event report",
+        title=str(campaign.get("title") or name),
+        subtitle=_estimate_sentence(result),
+        created=str(record.record.get("created_utc", "")),
+        facts=_estimate_facts(record),
+        verdicts=(_verdict_card(result),),
+        costs=tuple(_cost_cards(result)),
+        warnings=tuple(map(spelled, result["remarks"])),
+        sections=numbered(sections),
     )
 
 

@@ -68,18 +68,16 @@ def build_tuning(record: TuningRecord, name: str) -> Document:
         Section("provenance", "Provenance", (provenance_table(tuned),)),
         Section("reading", "Glossary", (GLOSSARY,)),
     )
-    return numbered(
-        Document(
-            kind="Tuning report",
-            title=str(campaign.get("title") or name),
-            subtitle=_front_sentence(tuned),
-            created=str(tuned.manifest.get("created_utc", "")),
-            facts=_search_facts(tuned),
-            verdicts=tuple(_constraint_cards(tuned)),
-            costs=tuple(_objective_cards(tuned)),
-            warnings=tuple(_search_warnings(tuned)),
-            sections=tuple(section for section in sections if section.blocks),
-        )
+    return Document(
+        kind="Tuning report",
+        title=str(campaign.get("title") or name),
+        subtitle=_front_sentence(tuned),
+        created=str(tuned.manifest.get("created_utc", "")),
+        facts=_search_facts(tuned),
+        verdicts=tuple(_constraint_cards(tuned)),
+        costs=tuple(_objective_cards(tuned)),
+        warnings=tuple(_search_warnings(tuned)),
+        sections=numbered(section for section in sections if section.blocks),
     )
 
 

@@ -163,7 +163,7 @@ def with_own_sections(document: Document, template: Path, run: RunFacts, runs: S
         own = sections_of(filled["text"], placed, ANCHOR)
     except ValueError as error:
         raise TemplateError(f"{template}: {error}") from None
-    return numbered(replace(document, sections=(*own, *document.sections)))
+    return replace(document, sections=numbered((*own, *document.sections)))
 
 
 def _filled_in(

@@ -349,8 +349,8 @@ def test_a_title_of_two_lines_is_in_its_panel(browser, tmp_path):
     title = "the mean deviation of the longitude over a whole day"
     plot = Plot((Line(np.arange(3.0), np.arange(3.0), "@ink"),), Axis("time [s]"), Axis(), title)
     own = Section("own", "Own", (FigureBlock("Lines", Drawing("Curves", (plot,))),))
-    document = replace(build(synthetic_run(60), "run"), sections=(own,))
-    (tmp_path / "report.html").write_bytes(render_html(numbered(document)))
+    document = replace(build(synthetic_run(60), "run"), sections=numbered((own,)))
+    (tmp_path / "report.html").write_bytes(render_html(document))
     browser.open(tmp_path / "report.html")
     browser.until(f"{DRAWN}.every(Boolean)")
     lines = "[...document.querySelectorAll('.gtitle .line')].map((line) => line.getBoundingClientRect())"
