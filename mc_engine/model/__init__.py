@@ -3,6 +3,7 @@
 from mc_engine.model.declarations import (
     at_end,
     choices,
+    declared_in,
     inputs,
     last_above,
     maximum_of,
@@ -50,6 +51,7 @@ __all__ = [
     "at_end",
     "choices",
     "compiled_loop",
+    "declared_in",
     "inputs",
     "kept_design",
     "last_above",

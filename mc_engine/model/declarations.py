@@ -7,12 +7,16 @@ unit: Parameter(0.1, "eccentricity", unit="").
 
 from collections import namedtuple
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 from mc_engine.errors import ModelError
+from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model.fields import OF_NAME, Extremum, Field, Named, Parameter, Setting
 from mc_engine.units import UNITS, unit_hint, unit_of
+
+_RECORDS = {"states": "State", "outputs": "Outputs", "metrics": "Metrics", "events": "EVENTS", "extrema": "EXTREMA"}
+_PHYSICS = ("initial", "start", "rhs", "control", "switch", "observe", "evaluate")
 
 
 @dataclass(frozen=True)
@@ -273,6 +277,33 @@ def metrics(**declared: str | Field | Metric) -> Any:
     made: Any = _record("Metrics", rest, fields)
     made.computed = computed
     return made
+
+
+def declared_in(*modules: ModuleType) -> dict[str, Any]:
+    """What the modules of a model declare, for `model`: MODEL = model(name=..., **declared_in(dynamics, outcome)).
+
+    modules : they may have State, Outputs, Metrics, EVENTS and EXTREMA, which become `states`, `outputs`, `metrics`,
+        `events` and `extrema`; and physics called initial, start, rhs, control, switch, observe or evaluate
+
+    Returns the dictionary of what is found, by argument.
+
+    Raises ModelError where two modules have different things of one name.
+
+    >>> from campaigns.deorbit import dynamics
+    >>> declared_in(dynamics)["rhs"] is dynamics.rhs
+    True
+    """
+    found: dict[str, Any] = {}
+    for module in modules:
+        parts = {argument: vars(module).get(name) for argument, name in _RECORDS.items()}
+        parts |= {name: vars(module).get(name) for name in _PHYSICS}
+        for argument, part in parts.items():
+            # a function or a module of such a name, which is no physics, is something else
+            if part is None or (argument in _PHYSICS and not isinstance(part, PhysicsFunction)):
+                continue
+            if found.setdefault(argument, part) is not part:
+                raise ModelError(f"two modules have a `{_RECORDS.get(argument, argument)}`; rename one of them")
+    return found
 
 
 def _of_fields(title: str, what: str, declared: dict[str, Any]) -> Any:

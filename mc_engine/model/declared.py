@@ -65,7 +65,8 @@ def model(
 
     Except `prepare` and `tables`, which are NumPy, the functions are marked with `mc_engine.lanes.physics`.  Each takes
     what it names, in any order, in SI and radians: the time t [s], the state s, the discrete state m, the parameters p
-    and the settings o, also called time, state, memory, parameters and settings.
+    and the settings o, also called time, state, memory, parameters and settings.  What other files of the model declare
+    may be handed over by `declared_in`.
 
     name : str
     title : str, one line for reports

@@ -1,5 +1,7 @@
 """Declarations of a model: what they make, that kernels have the same bits, and what is said of mistakes in them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from mistaken_campaign import campaign_with, refused, with_input
@@ -8,7 +10,19 @@ from mc_engine.errors import ModelError
 from mc_engine.flight.contract import breaches
 from mc_engine.flight.flight import fly, fly_interpreted
 from mc_engine.flight.interpreted import InterpretedFlight
-from mc_engine.model import Field, Parameter, Setting, choices, inputs, maximum_of, metrics, outputs, states
+from mc_engine.lanes import physics
+from mc_engine.model import (
+    Field,
+    Parameter,
+    Setting,
+    choices,
+    declared_in,
+    inputs,
+    maximum_of,
+    metrics,
+    outputs,
+    states,
+)
 from mc_engine.units import unit_of
 
 
@@ -22,6 +36,16 @@ def test_one_declaration_makes_the_tuple_and_the_columns():
     assert states(x_m="x", vx_m_s="speed")(x=1.0, vx=2.0) == (1.0, 2.0)
     assert outputs(share=Field("a share", unit="", low=0.0)).declared[0].low == 0.0
     assert metrics(top_m_s=maximum_of("v_m_s", "top"), e=Field("e", unit=""))._fields == ("e",)
+
+
+def test_what_the_files_of_a_model_declare_is_found_under_the_names_of_the_arguments_of_model():
+    files = SimpleNamespace(State="s", EVENTS={}, rhs=physics(lambda s: s), control=np), SimpleNamespace(Outputs="o")
+    assert declared_in(*files) == {"states": "s", "events": {}, "rhs": files[0].rhs, "outputs": "o"}
+    assert declared_in(files[0], SimpleNamespace(rhs=files[0].rhs))["rhs"] is files[0].rhs  # imported by the other
+    with pytest.raises(ModelError, match="two modules have a `rhs`; rename one of them"):
+        declared_in(files[0], SimpleNamespace(rhs=physics(lambda s: s)))
+    with pytest.raises(ModelError, match="two modules have a `State`; rename one of them"):
+        declared_in(files[0], SimpleNamespace(State="another"))
 
 
 def test_a_computed_metric_without_a_description_is_described_in_the_words_of_its_output(tmp_path):
