@@ -12,7 +12,7 @@ from collections import namedtuple
 from campaigns.deorbit.inputs import CHOICES
 from mc_engine.lanes import any_lane, atan2, exp, physics, replace, sincos, sqrt, where
 from mc_engine.lanes.noise import normal_pair
-from mc_engine.model import states
+from mc_engine.model import Event, states
 from mc_engine.physics.atmosphere import layered
 from mc_engine.physics.constants import EARTH_RATE, EQUATORIAL_RADIUS, MU_EARTH
 from mc_engine.physics.frames import half_turn
@@ -31,6 +31,7 @@ State = states(
 # element; modulator
 Memory = namedtuple("Memory", "position_error velocity_error scale on pulses", defaults=(0.0, 0.0))
 Elements = namedtuple("Elements", "a e omega")
+Trigger = namedtuple("Trigger", "pulse_on pulse_off")
 Desired = namedtuple("Desired", "position velocity acceleration radial transverse rate")
 
 
@@ -89,7 +90,7 @@ def start(p):
 
 
 @physics
-def fix_position(m, p, draws):
+def control(m, p, draws):
     """A new navigation fix: constant error plus a fresh normal deviate on every component [m, m/s along R, T, N]."""
     position = Vector(
         p.navigation_radial_position_error, p.navigation_transverse_position_error, p.navigation_normal_position_error
@@ -173,8 +174,11 @@ def craft_mass(s, p, o):
 
 
 @physics
-def command(t, s, m, d, p, o):
-    """Commanded force [N] as a vector, and its size; zero when the control is off."""
+def thrust(t, s, m, d, p, o):
+    """(command, size, scale, force): the commanded force [N] as a vector, its size, and what the thrusters make of it.
+
+    scale : of the true force over the commanded one;  force : size of the true one [N].  Zero when the control is off.
+    """
     e, w = deviation(s)
     if o.control == CHOICES.control.pulsed and o.pulse_feed == CHOICES.pulse_feed.continuous:
         e, w = ideal_errors(t, p)
@@ -186,20 +190,13 @@ def command(t, s, m, d, p, o):
     mass = craft_mass(s, p, o)
     if o.control == CHOICES.control.off:
         mass = 0.0
-    return scaled(mass, u), mass * norm(u)
-
-
-@physics
-def thrust(size, m, p, o):
-    """(scale, force): what the thrusters make of a command of this size [N]; force [N] is the true one."""
+    size, scale = mass * norm(u), 1.0
     if o.control == CHOICES.control.clipped:
         scale = where(size > p.thrust_limit, p.thrust_limit / where(size > 0.0, size, 1.0), 1.0)
     elif o.control == CHOICES.control.pulsed:
         scale = m.on * p.thrust_limit / where(size > 0.0, size, 1.0)
-    else:
-        scale = 1.0
     scale = scale * p.thrust_factor
-    return scale, scale * size
+    return scaled(mass, u), size, scale, scale * size
 
 
 @physics
@@ -221,11 +218,10 @@ def rhs(t, s, m, p, o):
     d = desired_motion(s.f_desired, p)
     r, v = flown(s, d)
     gravity = Vector(*point_mass(r.x, r.y, r.z, MU_EARTH))  # (1) before the law, which need not compute it again
-    commanded, size = command(t, s, m, d, p, o)
-    scale, force = thrust(size, m, p, o)
+    command, size, scale, force = thrust(t, s, m, d, p, o)
     inverse_mass = 1.0 / craft_mass(s, p, o)
     free = added(subtracted(gravity, d.acceleration), disturbances(r, v, p, o))
-    a = added_scaled(free, scale * inverse_mass, commanded)
+    a = added_scaled(free, scale * inverse_mass, command)
     filtered = 0.0
     if o.control == CHOICES.control.pulsed:
         k_in, k_fb = p.modulator_input_gain, p.modulator_feedback_gain
@@ -244,19 +240,22 @@ def entry(s, p):
     return dot(r, r) - p.target_radius * p.target_radius
 
 
-# The Schmitt trigger of the modulator: M. J. Sidi, Spacecraft Dynamics and Control (1997), which the source follows.
-
-
 @physics
-def pulse_on(s, m, p):
-    """Filtered input [N] over the upper level of the trigger, while the thruster is off."""
-    return where(m.on > 0.5, -1.0, s.filtered - p.modulator_on)
+def trigger(s, m, p):
+    """Filtered input [N] over the levels of the modulator's Schmitt trigger, each while it is looked for.
+
+    M. J. Sidi, Spacecraft Dynamics and Control (1997), which the source follows.
+    """
+    on = m.on > 0.5
+    off_level = where(on, s.filtered - p.modulator_off, 1.0)
+    return Trigger(pulse_on=where(on, -1.0, s.filtered - p.modulator_on), pulse_off=off_level)
 
 
-@physics
-def pulse_off(s, m, p):
-    """Filtered input [N] over the lower level of the trigger, while the thruster is on."""
-    return where(m.on > 0.5, s.filtered - p.modulator_off, 1.0)
+EVENTS = {
+    "entry": Event(entry, "falling", "stop"),
+    "pulse_on": Event(trigger, "rising", "switch", rare=True),
+    "pulse_off": Event(trigger, "falling", "switch", rare=True),
+}
 
 
 @physics

@@ -8,7 +8,7 @@ import numpy as np
 from campaigns.deorbit import dynamics, outcome
 from campaigns.deorbit.inputs import CHOICES, Inputs
 from campaigns.deorbit.path_design import design_path, first_deviation, path_axes
-from mc_engine.model import Event, FixedStep, Refusals, model, prepared
+from mc_engine.model import FixedStep, Refusals, declared_in, model, prepared
 from mc_engine.model.figures import HistoryFigure, MapFigure, ScatterFigure
 from mc_engine.physics.constants import STANDARD_GRAVITY
 from mc_engine.studies.published import read_published
@@ -53,25 +53,10 @@ MODEL = model(
     source="S. Divsalar, R. Nadafi, M. Kabganian, Design of a trajectory-correction algorithm for a spacecraft in a "
     "de-orbit manoeuvre by the feedback-linearization method (in Persian), Electronics Industries Quarterly 7(1), 2016",
     inputs=Inputs,
-    states=dynamics.State,
-    outputs=outcome.Outputs,
-    metrics=outcome.Metrics,
     clock=FixedStep("step", "time_limit", "steps_per_fix"),
     kernel_parameters=prepared(prepare, Inputs),
     prepare=prepare,
-    initial=dynamics.initial,
-    start=dynamics.start,
-    rhs=dynamics.rhs,
-    control=dynamics.fix_position,
-    switch=dynamics.switch,
-    events={
-        "entry": Event(dynamics.entry, "falling", "stop"),
-        "pulse_on": Event(dynamics.pulse_on, "rising", "switch", rare=True),
-        "pulse_off": Event(dynamics.pulse_off, "falling", "switch", rare=True),
-    },
-    observe=outcome.observe,
-    evaluate=outcome.evaluate,
-    extrema=outcome.EXTREMA,
+    **declared_in(dynamics, outcome),
     figures=(
         MapFigure("propellant_kg", "ve_pct", "oe_pct", "Correction propellant over the errors of the burn"),
         MapFigure("correction_impulse_m_s", "ve_pct", "oe_pct", "Correction impulse over the errors of the burn"),

@@ -1,6 +1,6 @@
 """Quantities along a de-orbit flight and metrics at its end.  SI, radians."""
 
-from campaigns.deorbit.dynamics import command, desired_motion, deviation, element_errors, flown, initial, thrust
+from campaigns.deorbit.dynamics import desired_motion, deviation, element_errors, flown, initial, thrust
 from campaigns.deorbit.inputs import CHOICES
 from mc_engine.lanes import asin, atan2, exp, maximum, minimum, physics, sqrt, where
 from mc_engine.model import Field, at_end, last_above, maximum_of, metrics, minimum_of, outputs
@@ -78,8 +78,7 @@ def observe(t, s, m, p, o):
     d = desired_motion(s.f_desired, p)
     r, _ = flown(s, d)
     dr, dv = deviation(s)
-    commanded, size = command(t, s, m, d, p, o)
-    scale, force = thrust(size, m, p, o)
+    command, size, scale, force = thrust(t, s, m, d, p, o)
     errors = element_errors(s, p)
     a_left, e_left, omega_left = m.scale.a * errors.a, m.scale.e * errors.e, m.scale.omega * errors.omega
     return Outputs(
@@ -93,9 +92,9 @@ def observe(t, s, m, p, o):
         omega_remaining=omega_left,
         unsettled=maximum(maximum(abs(a_left), abs(e_left)), abs(omega_left)),
         force=force,
-        force_radial=scale * dot(commanded, d.radial),
-        force_transverse=scale * dot(commanded, d.transverse),
-        force_normal=scale * dot(commanded, cross(d.radial, d.transverse)),
+        force_radial=scale * dot(command, d.radial),
+        force_transverse=scale * dot(command, d.transverse),
+        force_normal=scale * dot(command, cross(d.radial, d.transverse)),
         command=size,
         impulse=s.impulse,
         radius=norm(r),

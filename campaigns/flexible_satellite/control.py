@@ -64,16 +64,6 @@ def integrand(q, w, p):
 
 
 @physics
-def limited(u, limit):
-    """The vector, shortened to `limit` where it is longer.  (15)"""
-    size2 = dot(u, u)
-    over = size2 > limit * limit
-    if any_lane(over):
-        u = scaled(where(over, limit / sqrt(where(over, size2, 1.0)), 1.0), u)
-    return u
-
-
-@physics
 def sign(x):
     """-1, 0 or 1."""
     return where(x > 0.0, 1.0, where(x < 0.0, -1.0, 0.0))
@@ -91,7 +81,10 @@ def law(q, w, integral, p):
     turned = subtracted(q, Vector(p.q1, p.q2, p.q3))
     integral = added_scaled(integral, -p.integral_gamma, turned)
     u = subtracted(subtracted(scaled(-kd, w), scaled(kp, q)), scaled(ki, integral))
-    u = limited(u, p.torque_limit)
+    size2 = dot(u, u)
+    over = size2 > p.torque_limit * p.torque_limit
+    if any_lane(over):  # (15): shortened to the limit
+        u = scaled(where(over, p.torque_limit / sqrt(where(over, size2, 1.0)), 1.0), u)
     if any_lane(p.dbar > 0.0):
         v = added_scaled(scaled(p.switching_rate_gain, w), p.switching_attitude_gain, q)
         u = added_scaled(u, -p.dbar, Vector(sign(v.x), sign(v.y), sign(v.z)))

@@ -1,7 +1,6 @@
 """The flexible-satellite model as the engine sees it: each case's matrices and the MODEL record.
 
-Numbers in brackets are equations of H. Taei, S. Ayati, S. F. Mousavi, Iranian Journal of Mechanical Engineering 24(3),
-2022.
+Numbers in brackets are equations of the source of `MODEL`.
 """
 
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 from campaigns.flexible_satellite import control, dynamics, outcome
 from campaigns.flexible_satellite.dynamics import AXES, MODES
 from campaigns.flexible_satellite.inputs import CHOICES, Inputs
-from mc_engine.model import FixedStep, Refusals, model, prepared
+from mc_engine.model import FixedStep, Refusals, declared_in, model, prepared
 from mc_engine.model.figures import HistoryFigure, ScatterFigure
 from mc_engine.physics.attitude import rotation_quaternion
 from mc_engine.physics.constants import STANDARD_GRAVITY
@@ -56,8 +55,7 @@ def _inverse_of_rigid_part(inertia: np.ndarray, coupling: np.ndarray, refusals: 
     refusals.add(~finite, "the inertia matrix is not finite")
     unit = np.eye(3)
     usable = finite[:, None, None]
-    inertia = np.where(usable, inertia, unit)
-    low, middle, high = np.linalg.eigvalsh(inertia).T
+    low, middle, high = np.linalg.eigvalsh(np.where(usable, inertia, unit)).T
     refusals.add(~(low > 0.0), "the inertia matrix is not positive definite")
     refusals.add(
         high > (low + middle) * (1.0 + 1e-12),
@@ -119,18 +117,10 @@ MODEL = model(
     source="H. Taei, S. Ayati, S. F. Mousavi, Robust PID control of a flexible satellite considering thruster actuator "
     "dynamics (in Persian), Iranian Journal of Mechanical Engineering 24(3), 2022, doi 10.30506/IJMEP.2022.525295.1770",
     inputs=Inputs,
-    states=dynamics.State,
-    outputs=outcome.Outputs,
-    metrics=outcome.Metrics,
     clock=FixedStep("step", "duration", "steps_per_sample"),
     kernel_parameters=prepared(prepare, Inputs),
     prepare=prepare,
-    initial=dynamics.initial,
-    start=control.start,
-    rhs=dynamics.rhs,
-    control=control.control,
-    observe=outcome.observe,
-    evaluate=outcome.evaluate,
+    **declared_in(dynamics, control, outcome),
     figures=(
         HistoryFigure(("q0", "q1", "q2", "q3"), "Attitude in the orbital frame"),
         HistoryFigure(("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s", "rate_rad_s"), "Inertial body rates"),

@@ -74,8 +74,8 @@ MODEL = model(
     memory=Memory,
     rhs=rhs,
     events={
-        "pulse_on": Event(dynamics.pulse_on, "rising", "switch"),
-        "pulse_off": Event(dynamics.pulse_off, "falling", "switch"),
+        "pulse_on": Event(dynamics.trigger, "rising", "switch"),
+        "pulse_off": Event(dynamics.trigger, "falling", "switch"),
     },
     switch=switch,
     observe=observe,
