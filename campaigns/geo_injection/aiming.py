@@ -68,7 +68,7 @@ def _orbit(s, final, planar):
 def impulse_at(s, angle, tilt, radius, planar):
     """The impulse [s, m/s] on the coast from the state s at an angle [rad] from its node (planar: perigee).
 
-    tilt : inclination of the final orbit [rad];  radius : of it, and the semi-major axis that is wanted [m]
+    tilt, radius : inclination [rad] and radius [m] of the final orbit, the radius being the semi-major axis wanted
     Derived here: in the direction d, r = h^2 / (mu (1 + e.d)) and v = (mu/h) u x (e + d); the velocity after the
     impulse is level, in the final plane, and of the size that the vis-viva equation gives.
     """

@@ -21,23 +21,16 @@ State = states(
     **{f"v{axis}_m_s": f"inertial velocity, {axis}" for axis in "xyz"},
     mass_kg="mass",
 )
-# What `prepare` gives: at the first ignition; of the engine; ignition: nominal time of the burn plus its delay, after
-# the first [s]; pitch, yaw: tangents of the pointing errors; the inputs that are used as they are.  SI.
-Parameters = namedtuple(
-    "Parameters",
-    "x y z vx vy vz mass thrust flow tail ignition_2 ignition_3 pitch_1 pitch_2 pitch_3 yaw_1 yaw_2 yaw_3 "
-    "ignition_delay_1 ignition_delay_2 ignition_delay_3 accelerometer_scale_error "
-    "navigation_position_r navigation_position_t navigation_position_n "
-    "navigation_velocity_r navigation_velocity_t navigation_velocity_n",
-)
 # The segment that is flown.  end [s];  middle, rate: of the steering's argument s, from -1 to 1 over the segment
 Arc = namedtuple("Arc", "steering end middle rate")
+# next_segment: of a long burn;  burn_out: of a tail-off that does not end the flight
+Crossings = namedtuple("Crossings", "ignite next_segment shut_down burn_out injected")
 # burn, segment: counted from 0;  until: time at which the phase ends [s];  mass_ignited [kg];  pitch, yaw: of the burn
 # ignited, burn_out_1, burn_out_2: times so far [s]
 Memory = namedtuple(
     "Memory",
-    "arc aim phase burn segment until mass_ignited pitch yaw ignited burn_out_1 burn_out_2",
-    defaults=(0.0, 0.0, 0.0),
+    "arc aim phase until mass_ignited pitch yaw burn segment ignited burn_out_1 burn_out_2",
+    defaults=(0.0, 0.0, 0.0, 0.0, 0.0),
 )
 
 COAST, BURN, TAIL = 0.0, 1.0, 2.0
@@ -96,61 +89,35 @@ def rhs(t, s, m, p):
 
 
 @physics
-def _past_command(t, s, m, p, o):
-    """Time [s] past the one at which a burn is shut down; by sensed velocity, speed change [m/s] past the commanded.
+def crossings(t, s, m, p, o):
+    """What rises through zero at the events, `NEVER` where it is not looked for: times [s] past what is due.
 
-    The accelerometer counts the speed change since ignition: by the rocket equation.
+    By sensed velocity a burn is shut down where the speed change [m/s] that the accelerometer has counted since
+    ignition is the commanded one: by the rocket equation.
     """
+    late = t - m.until
+    commanded = late
     if o.shutdown == CHOICES.shutdown.sensed_velocity:
         scale = (1.0 + p.accelerometer_scale_error) * (p.thrust / p.flow)
-        return scale * log(maximum(m.mass_ignited / s.mass, 1e-300)) - m.aim.sensed
-    return t - m.until
-
-
-@physics
-def _is_last(m, o):
-    return m.burn + 1.0 >= nominal(o.tables).burns
-
-
-@physics
-def ignition(t, m):
-    """Time [s] past the end of a coast."""
-    return where(m.phase == COAST, t - m.until, NEVER)
-
-
-@physics
-def next_segment(t, m):
-    """Time [s] past the end of a segment of a long burn."""
-    return where(m.phase == BURN, t - m.arc.end, NEVER)
-
-
-@physics
-def shut_down(t, s, m, p, o):
-    """Past the command, as `_past_command`, that does not end the flight."""
-    goes_on = (m.phase == BURN) & ((not _is_last(m, o)) | (p.tail > 0.0))
-    return where(goes_on, _past_command(t, s, m, p, o), NEVER)
-
-
-@physics
-def burn_out(t, m, o):
-    """Time [s] past the end of a tail-off that does not end the flight."""
-    return where((m.phase == TAIL) & (not _is_last(m, o)), t - m.until, NEVER)
-
-
-@physics
-def injected(t, s, m, p, o):
-    """Past the end of the last burn: of its tail-off [s] or, without one, the command, as `_past_command`."""
-    at_command, after_tail = (m.phase == BURN) & (p.tail <= 0.0), m.phase == TAIL
-    past = where(at_command, _past_command(t, s, m, p, o), where(after_tail, t - m.until, NEVER))
-    return where(_is_last(m, o), past, NEVER)
+        commanded = scale * log(maximum(m.mass_ignited / s.mass, 1e-300)) - m.aim.sensed
+    burning, in_tail, has_tail = m.phase == BURN, m.phase == TAIL, p.tail > 0.0
+    is_last = m.burn + 1.0 >= nominal(o.tables).burns
+    end = where(burning & (not has_tail), commanded, where(in_tail, late, NEVER))
+    return Crossings(
+        ignite=where(m.phase == COAST, late, NEVER),
+        next_segment=where(burning, t - m.arc.end, NEVER),
+        shut_down=where(burning & ((not is_last) | has_tail), commanded, NEVER),
+        burn_out=where(in_tail & (not is_last), late, NEVER),
+        injected=where(is_last, end, NEVER),
+    )
 
 
 EVENTS = {
-    "ignite": Event(ignition, "rising", "switch"),
-    "next_segment": Event(next_segment, "rising", "switch", rare=True),
-    "shut_down": Event(shut_down, "rising", "switch"),
-    "burn_out": Event(burn_out, "rising", "switch", rare=True),
-    "injected": Event(injected, "rising", "stop"),
+    "ignite": Event(crossings, "rising", "switch"),
+    "next_segment": Event(crossings, "rising", "switch", rare=True),
+    "shut_down": Event(crossings, "rising", "switch"),
+    "burn_out": Event(crossings, "rising", "switch", rare=True),
+    "injected": Event(crossings, "rising", "stop"),
 }
 
 
@@ -174,8 +141,6 @@ def start(p, o):
         arc=_arc(0.0, 0.0, aim, o),
         aim=aim,
         phase=BURN,
-        burn=0.0,
-        segment=0.0,
         until=burn_row(o.tables, 0.0).duration - 0.5 * o.tail_off,
         mass_ignited=p.mass,
         pitch=p.pitch_1,

@@ -10,17 +10,10 @@ AXES = {"r": "radial", "t": "transverse", "n": "normal"}
 _AIMED = "from which the last burn is aimed"
 
 
-def _factor(description: str, low: float = 0.1, high: float = 10.0) -> Parameter:
-    return Parameter(1.0, description, low, high, unit="")
-
-
-def _error(description: str, most: float, **unit: Any) -> Parameter:
-    return Parameter(0.0, description, -most, most, **unit)
-
-
 def _each(keys: Iterable[str], name: str, description: str, most: float, **unit: Any) -> dict[str, Parameter]:
     """Errors of one kind by column; {} in name and description is the key, a burn or an axis, and its word."""
-    return {name.format(key): _error(description.format(AXES.get(key, key)), most, **unit) for key in keys}
+    words = {key: description.format(AXES.get(key, key)) for key in keys}
+    return {name.format(key): Parameter(0.0, word, -most, most, **unit) for key, word in words.items()}
 
 
 def _transfer(k: int) -> dict[str, Setting]:
@@ -34,18 +27,18 @@ def _transfer(k: int) -> dict[str, Setting]:
 
 
 Inputs = inputs(
-    thrust_factor=_factor("thrust over its nominal value; the mass flow follows"),
-    isp_factor=_factor("specific impulse over its nominal value"),
-    initial_mass_factor=_factor("mass at the first ignition over its nominal value"),
+    thrust_factor=Parameter(1.0, "thrust over its nominal value; the mass flow follows", 0.1, 10.0, unit=""),
+    isp_factor=Parameter(1.0, "specific impulse over its nominal value", 0.1, 10.0, unit=""),
+    initial_mass_factor=Parameter(1.0, "mass at the first ignition over its nominal value", 0.1, 10.0, unit=""),
     **_each(BURNS, "ignition_delay_{}_s", "delay of ignition {} against its nominal time", 1e4, unit="s"),
-    pitch_error_deg=_error("pointing error towards Z x d, all burns", 80.0),
-    yaw_error_deg=_error("pointing error towards the pole, across the thrust, all burns", 80.0),
+    pitch_error_deg=Parameter(0.0, "pointing error towards Z x d, all burns", -80.0, 80.0),
+    yaw_error_deg=Parameter(0.0, "pointing error towards the pole, across the thrust, all burns", -80.0, 80.0),
     **_each(BURNS, "pitch_error_{}_deg", "pitch error of burn {}, added to that of all", 80.0),
     **_each(BURNS, "yaw_error_{}_deg", "yaw error of burn {}, added to that of all", 80.0),
     **_each(AXES, "initial_position_{}_m", "{} error of the initial position", 1e6, unit="m"),
     **_each(AXES, "initial_velocity_{}_m_s", "{} error of the initial velocity", 1e3, unit="m/s"),
-    tail_off_factor=_factor("duration of the tail-off over its nominal value", 0.0, 100.0),
-    accelerometer_scale_error=_error("relative error of the sensed velocity", 0.5, unit=""),
+    tail_off_factor=Parameter(1.0, "duration of the tail-off over its nominal value", 0.0, 100.0, unit=""),
+    accelerometer_scale_error=Parameter(0.0, "relative error of the sensed velocity", -0.5, 0.5, unit=""),
     **_each(AXES, "navigation_position_{}_m", "{} error of the navigated position " + _AIMED, 1e6, unit="m"),
     **_each(AXES, "navigation_velocity_{}_m_s", "{} error of the navigated velocity " + _AIMED, 1e3, unit="m/s"),
     burns=Setting(2.0, "number of burns", low=2.0, high=3.0, whole=True, unit=""),

@@ -41,10 +41,8 @@ def _report(name: str, n_cases: int = 4000) -> None:
     campaign, ids = load_campaign(name), np.arange(n_cases)
     drawn = case_table(campaign, ids)
     flown = pd.DataFrame(fly(MODEL, {**campaign.nominal, **drawn}, ids, campaign.seed))
-    table = contributions(
-        campaign.nominal,
-        {dispersion.name: np.std(drawn[dispersion.name], ddof=1) for dispersion in campaign.dispersions},
-    )
+    sigmas = {one.name: np.std(drawn[one.name], ddof=1) for one in campaign.dispersions}
+    table = contributions(campaign.nominal, sigmas)
     table.loc["sigma, linear"], table.loc["sigma, flown"] = np.sqrt((table**2).sum()), flown[SMOOTH].std()
     lengths = flown[LENGTHS].quantile([0.5, 0.99]).set_axis(["median", "99 %"])
     print(f"{name}: {n_cases} cases; change by one standard deviation of each dispersion")

@@ -14,15 +14,11 @@ from campaigns.geo_injection.design.sequence import Sequence, source_orbits
 from campaigns.geo_injection.inputs import AXES, CHOICES, Inputs
 from campaigns.geo_injection.program_table import table_of
 from mc_engine.errors import ModelError
-from mc_engine.model import AdaptiveStep, Refusals, model
+from mc_engine.model import AdaptiveStep, Refusals, declared_in, model, prepared
 from mc_engine.model.figures import HistoryFigure, MapFigure, ProfileFigure, ScatterFigure
 from mc_engine.physics.frames import WGS84_RADIUS
 from mc_engine.studies.published import read_published
 
-SOURCE = (
-    "M. Alavipour, A. A. Nikkhah, J. Roshanian, Optimal trajectory design of an upper stage for satellite injection "
-    "into geostationary orbit using limited thrust (in Persian), Journal of Space Science and Technology, after 2016"
-)
 ALLOWED = dynamics.State(x=1e-3, y=1e-3, z=1e-3, vx=1e-6, vy=1e-6, vz=1e-6, mass=1e-6)  # error of a step
 
 
@@ -66,43 +62,36 @@ def tables(o: Any) -> np.ndarray:
     return table_of(program, nominal_impulse(program))
 
 
-def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
+def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
     """Kernel parameters of each case, SI; cases of one sequence are prepared together."""
     codes = np.column_stack(list(vars(settings).values()))
-    rows = {name: np.zeros(len(codes)) for name in dynamics.Parameters._fields}
-    late = np.zeros(len(codes), dtype=bool)
+    states, durations, ignitions = np.zeros((6, len(codes))), np.zeros((3, len(codes))), np.full((3, len(codes)), 1e300)
     # usually all cases have one sequence, and sorting their rows takes longer than flying the cases
     for row in codes[:1] if (codes == codes[:1]).all() else np.unique(codes, axis=0):
         same = (codes == row).all(axis=1)
-        chosen = SimpleNamespace(**dict(zip(vars(settings), row, strict=True)))
         try:
-            program = program_for(sequence_of(chosen))
+            program = program_for(sequence_of(SimpleNamespace(**dict(zip(vars(settings), row, strict=True)))))
         except ModelError as error:
             refusals.add(same, str(error))
             continue
-        part = SimpleNamespace(**{name: column[same] for name, column in vars(inputs).items()})
-        columns, late[same] = _rows(part, chosen.tail_off, program)
-        for name in rows:
-            rows[name][same] = columns[name]
+        states[:, same] = _first_states(SimpleNamespace(**{name: x[same] for name, x in vars(i).items()}), program)
+        for k, burn in enumerate(program.burns):
+            ignitions[k, same], durations[k, same] = burn.ignition_s, burn.duration_s
+    ignitions += [i.ignition_delay_1, i.ignition_delay_2, i.ignition_delay_3]
+    tail = settings.tail_off * i.tail_off_factor
+    late = (ignitions[1:] < ignitions[:-1] + durations[:-1] + tail).any(axis=0)
     refusals.add(late, "an ignition comes before the burn ahead of it has ended")
-    return rows
-
-
-def _rows(i: SimpleNamespace, tail_off: float, program: Program) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """(kernel parameters, where ignitions overlap burns) of the cases of one sequence.  tail_off : nominal [s]."""
-    sequence, given = program.sequence, vars(i)
-    rows = given | dict(zip(("x", "y", "z", "vx", "vy", "vz"), _first_states(i, program), strict=True))
-    rows["mass"] = sequence.mass * i.initial_mass_factor
-    rows["thrust"] = sequence.thrust * i.thrust_factor
-    rows["flow"] = sequence.mass_flow * i.thrust_factor / i.isp_factor
-    rows["tail"] = tail_off * i.tail_off_factor
-    ignitions = [burn.ignition_s + given[f"ignition_delay_{k}"] for k, burn in enumerate(program.burns, start=1)]
+    rows = vars(i) | dict(zip(("x", "y", "z", "vx", "vy", "vz"), states, strict=True))
     for k in (1, 2, 3):
-        rows[f"pitch_{k}"] = np.tan(i.pitch_error + given[f"pitch_error_{k}"])
-        rows[f"yaw_{k}"] = np.tan(i.yaw_error + given[f"yaw_error_{k}"])
-        rows[f"ignition_{k}"] = ignitions[min(k, len(ignitions)) - 1] - i.ignition_delay_1
-    ends = [ignition + burn.duration_s + rows["tail"] for ignition, burn in zip(ignitions, program.burns, strict=True)]
-    return rows, np.any(np.array(ignitions[1:]) < np.array(ends[:-1]), axis=0)
+        rows[f"pitch_{k}"] = np.tan(i.pitch_error + rows[f"pitch_error_{k}"])
+        rows[f"yaw_{k}"] = np.tan(i.yaw_error + rows[f"yaw_error_{k}"])
+        rows[f"ignition_{k}"] = ignitions[k - 1] - i.ignition_delay_1  # after the first, as the kernel's clock
+    return rows | {
+        "mass": settings.initial_mass * i.initial_mass_factor,
+        "thrust": settings.thrust * i.thrust_factor,
+        "flow": settings.mass_flow * i.thrust_factor / i.isp_factor,
+        "tail": tail,
+    }
 
 
 def _first_states(i: SimpleNamespace, program: Program) -> np.ndarray:
@@ -126,22 +115,15 @@ def _first_states(i: SimpleNamespace, program: Program) -> np.ndarray:
 MODEL = model(
     name="geo_injection",
     title="Injection into the geostationary circle",
-    source=SOURCE,
+    source="M. Alavipour, A. A. Nikkhah, J. Roshanian, Optimal trajectory design of an upper stage for satellite "
+    "injection into geostationary orbit using limited thrust (in Persian), Journal of Space Science and Technology, "
+    "after 2016",
     inputs=Inputs,
-    states=dynamics.State,
-    outputs=outcome.Outputs,
-    metrics=outcome.Metrics,
     clock=AdaptiveStep("time_limit", "tolerance", ALLOWED, attempts=20_000, first_step=10.0),
-    kernel_parameters=dynamics.Parameters,
+    kernel_parameters=prepared(prepare, Inputs),
     prepare=prepare,
-    initial=dynamics.initial,
-    start=dynamics.start,
     tables=tables,
-    rhs=dynamics.rhs,
-    events=dynamics.EVENTS,
-    switch=dynamics.switch,
-    observe=outcome.observe,
-    evaluate=outcome.evaluate,
+    **declared_in(dynamics, outcome),
     figures=(
         HistoryFigure(("radius_km", "speed_m_s", "radial_speed_m_s"), "Radius and speeds"),
         HistoryFigure(("flight_path_angle_deg", "thrust_right_ascension_deg", "thrust_declination_deg"), "Angles"),

@@ -1,4 +1,4 @@
-"""From the limit of large thrust to the wanted optimum, step by step.  Canonical units, unknowns as in `Solution`.
+"""From the limit of large thrust to the wanted optimum, step by step.  Canonical units, unknowns as in `unknowns_of`.
 
 Two burns: impulses give the guess at a large thrust, which is then lowered.  Three burns grow out of two.  An elliptic
 parking orbit is reached from the circle through its perigee, with the first burn about either node, or from the planar
@@ -6,6 +6,7 @@ sequence, with the first burn about perigee; the cheapest of what is found is th
 the orbit or on the engine.
 """
 
+from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -14,7 +15,6 @@ import numpy as np
 import scipy  # loads its packages when they are used
 
 from campaigns.geo_injection.design.coast import coast
-from campaigns.geo_injection.design.impulsive import propellant_share, two_impulses
 from campaigns.geo_injection.design.optimal import (
     FIRST_PLACE,
     Instead,
@@ -38,12 +38,12 @@ _PLACE_STEP = 0.1  # rad, in which the first place is looked for
 _VANISHING = 0.01  # of all burning: a burn that short is about to leave the sequence
 _SHORT = 0.05  # first length of an added burn, and how it grows, over the burn that it relieves
 
+# speed changes; semi-major axis of the transfer orbit; primer vector at the first impulse and its rate
+Impulsive = namedtuple("Impulsive", "first second a primer rate")
+
 
 def optimum(problem: Problem) -> Solution:
-    """The optimum of two or three burns, from perigee to apogee; in canonical units.
-
-    ModelError tells how far the search got.
-    """
+    """The optimum of two or three burns, in canonical units; ModelError tells how far the search got."""
     if problem.burns not in (2, 3):
         raise ModelError(f"the optimal sequence has 2 or 3 burns, not {problem.burns}")
     apogee = (1.0 + problem.eccentricity) / (1.0 - problem.eccentricity)
@@ -53,14 +53,61 @@ def optimum(problem: Problem) -> Solution:
             "circles outside of it: lower parking_altitude_km or parking_eccentricity, or raise final_radius_km"
         )
     x = _two_burns(problem) if problem.burns == 2 else _three_burns(problem)
-    solution = Solution(problem, x, switch_states(problem, x[None])[0])
-    # each coast ends at the first apsis that serves: one that lasts a period, 2 pi a^1.5 by Kepler's third law, belongs
-    # to another sequence
-    ends = solution.states[1:-1:2]
+    durations, coasts, states = x[7 : 7 + problem.burns], x[7 + problem.burns :], switch_states(problem, x[None])[0]
+    ends = states[1:-1:2]
     a = 1.0 / (2.0 / np.linalg.norm(ends[:, :3], axis=1) - (ends[:, 3:6] ** 2).sum(1))
-    if not (solution.coasts < 2.0 * np.pi * a**1.5).all():
+    # a coast of a period, 2 pi a^1.5 by Kepler's third law, ends at a later apsis than the first: another sequence
+    if not (coasts < 2.0 * np.pi * a**1.5).all():
         raise ModelError(f"the search for the optimal {problem.burns} burns found only one that lets a revolution pass")
-    return solution
+    return Solution(problem, durations, coasts, np.cumsum([0.0, *(durations[:-1] + coasts)]), states)
+
+
+def two_impulses(plane_change: float, ratio: float) -> Impulsive:
+    """Two impulses at the apses on the node, least in speed over a split of the plane change [rad], between circles of
+    radius 1 and `ratio`: a bound of every sequence's propellant from below, and the guess that the search begins with.
+    """
+    a = 0.5 * (1.0 + ratio)
+    at_perigee, at_apogee, final = np.sqrt(ratio / a), np.sqrt(1.0 / (ratio * a)), np.sqrt(1.0 / ratio)
+
+    def changes(inclination: float) -> tuple[np.ndarray, np.ndarray]:
+        """Velocity changes at perigee and apogee over a transfer orbit of this inclination [rad]."""
+        along = np.array([0.0, np.cos(inclination), np.sin(inclination)])
+        before = np.array([0.0, np.cos(plane_change), np.sin(plane_change)])
+        return at_perigee * along - before, at_apogee * along - np.array([0.0, final, 0.0])
+
+    def cost(inclination: float) -> float:
+        return float(sum(np.linalg.norm(change) for change in changes(inclination)))
+
+    best = 0.0
+    if plane_change > 0.0:
+        found = scipy.optimize.minimize_scalar(cost, bounds=(0.0, plane_change), options={"xatol": 1e-12})
+        best = float(found.x)
+    first, second = changes(best)
+    start = np.array([1.0, 0.0, 0.0, 0.0, at_perigee * np.cos(best), at_perigee * np.sin(best)])
+    sizes = float(np.linalg.norm(first)), float(np.linalg.norm(second))
+    primer = first / sizes[0]
+    return Impulsive(*sizes, a, primer, _primer_rate(start, primer, second / sizes[1], np.pi * a**1.5))
+
+
+def _primer_rate(start: np.ndarray, first: np.ndarray, second: np.ndarray, dt: float) -> np.ndarray:
+    """Rate of the primer vector at the first impulse: it becomes `second` after dt, and is longest at both.
+
+    Half a revolution leaves one component free, so the five conditions (Lawden, 1963, chapter 5) on three numbers are
+    met by least squares.  Canonical units.
+    """
+    basis = np.zeros((4, 12))
+    basis[:, :6] = start
+    basis[0, 6:9] = first
+    basis[1:, 9:12] = np.eye(3)
+    moved = coast(basis, np.full(4, dt))[:, 6:]
+    own, by_rate = moved[0], moved[1:].T
+    rows = np.vstack([by_rate[:3], first, second @ by_rate[3:]])
+    return np.linalg.lstsq(rows, np.array([*(second - own[:3]), 0.0, -second @ own[3:]]), rcond=1e-9)[0]
+
+
+def propellant_share(speed_change: float, exhaust: float) -> float:
+    """Fraction of the initial mass that impulses of a total speed change need: eq. (1), integrated."""
+    return float(-np.expm1(-speed_change / exhaust))
 
 
 def _impulsive_guess(problem: Problem) -> np.ndarray:
@@ -90,10 +137,8 @@ def _two_burns(problem: Problem) -> np.ndarray:
 
 
 def _widened(problem: Problem) -> Problem:
-    """The problem with a plane change that is not small.
-
-    At small plane changes every place on a circle is nearly as good for the first ignition, and the search at a large
-    thrust loses its way; so it goes by a larger plane change.
+    """The problem with a plane change that is not small: at a small one every place on a circle is nearly as good for
+    the first ignition, and the search at a large thrust loses its way.
     """
     return problem if problem.plane_change == 0.0 else replace(problem, plane_change=max(problem.plane_change, WIDE))
 
@@ -101,8 +146,8 @@ def _widened(problem: Problem) -> Problem:
 def _from_node(problem: Problem, descending: bool = False) -> np.ndarray:
     """Impulses at a large thrust, then the eccentricity, then less thrust, then less plane change if it is small.
 
-    The first burn is about the ascending node, or about the descending one: from the mirror image about the earth's
-    centre, which a circle allows.  It changes the sign of the normal components and moves the place by pi [rad].
+    About the descending node: from the mirror image about the earth's centre, which a circle allows.  It changes the
+    sign of the normal components and moves the place by pi [rad].
     """
     wide = _widened(problem)
     circle = replace(wide.with_thrust(max(LARGE_THRUST, wide.thrust)), eccentricity=0.0)
@@ -117,10 +162,9 @@ def _from_node(problem: Problem, descending: bool = False) -> np.ndarray:
 
 
 def _from_perigee(problem: Problem) -> np.ndarray:
-    """The planar circle, then the eccentricity and the plane change with the first place held, then the best place.
+    """The planar circle, then eccentricity and plane change with the first place [rad] held, then the best place.
 
     A planar circle has no place of its own, and an ellipse that is nearly one only a soft one.  Less thrust comes last.
-    Gives the unknowns in canonical units; their first, the place, is moved by the argument of the perigee [rad].
     """
     strong = problem.with_thrust(max(problem.thrust, 2.0 * GENTLE_THRUST))
     circle = replace(strong, plane_change=0.0, eccentricity=0.0)
@@ -135,7 +179,7 @@ def _best_place(problem: Problem, x: np.ndarray) -> np.ndarray:
     """Unknowns with the first place [rad] free: it is moved by steps while the burns grow shorter."""
 
     def moved(x: np.ndarray, by: float) -> np.ndarray | None:
-        """Unknowns with the first place moved by an angle [rad] and held there; None where there is no solution."""
+        """The solution with the first place moved by an angle [rad] and held there."""
         return solve(problem, x + by * np.eye(1, x.size)[0], FIRST_PLACE)
 
     for by in (_PLACE_STEP, -_PLACE_STEP):
@@ -149,10 +193,7 @@ def _best_place(problem: Problem, x: np.ndarray) -> np.ndarray:
 
 
 def _between(start: Problem, end: Problem, share: float) -> Problem:
-    """On the way from one problem to another: thrust along its logarithm, the rest along lines.
-
-    Canonical units; share : fraction of the way.
-    """
+    """A fraction of the way from one problem to another: thrust along its logarithm, the rest along lines."""
     if share >= 1.0:
         return end
     thrust = start.thrust * (end.thrust / start.thrust) ** share
@@ -162,10 +203,10 @@ def _between(start: Problem, end: Problem, share: float) -> Problem:
 
 
 def _follow(start: Problem, end: Problem, x: np.ndarray, instead: Instead | None = None) -> np.ndarray:
-    """Unknowns of the problem `end` from those of `start`, each step foreseen from the last two solutions (secant).
+    """Unknowns of the problem `end` from those of `start`, by steps that are fractions of the way.
 
-    A solution far from what was foreseen belongs to another family of extremals, and the step is halved.
-    A step is a fraction of the way; unknowns in canonical units.
+    Each is foreseen from the last two solutions (secant).  A solution far from what was foreseen belongs to another
+    family of extremals, and the step is halved.
     """
     if start == end:
         return x
@@ -173,14 +214,12 @@ def _follow(start: Problem, end: Problem, x: np.ndarray, instead: Instead | None
     last: tuple[float, np.ndarray] | None = None
     while done < 1.0:
         share = min(1.0, done + step)
-        here, there = _between(start, end, done), _between(start, end, share)
-        line = x if last is None else x + (share - done) / (done - last[0]) * (x - last[1])
-        guess = _longer_burns(here, there, x) if last is None else line
-        solution = solve(there, guess, instead)
+        guess = x if last is None else x + (share - done) / (done - last[0]) * (x - last[1])
+        solution = solve(_between(start, end, share), guess, instead)
         if solution is None or np.abs(solution - guess).max() > _FAR * max(1.0, np.abs(solution - x).max()):
             step *= 0.5
             if step < _LEAST_STEP:
-                raise ModelError(_how_far(here, end, x))
+                raise ModelError(_how_far(_between(start, end, done), end, x))
             continue
         last, x, done, step = (done, x), solution, share, min(1.5 * step, _LONGEST_STEP)
     return x
@@ -199,25 +238,8 @@ def _how_far(here: Problem, end: Problem, x: np.ndarray) -> str:
     return f"the search for the optimal {end.burns} burns stopped at {', '.join(where[:-1])} and {where[-1]}; {advice}"
 
 
-def _longer_burns(here: Problem, there: Problem, x: np.ndarray) -> np.ndarray:
-    """The same sequence with burns longer by what the thrust is smaller, about the same middles.
-
-    The burn times scale with 1 / thrust; sqrt(1 + e) is the rate of the place at perigee, in canonical
-    units.
-    """
-    n, guess = here.burns, x.copy()
-    guess[7 : 7 + n] *= here.thrust / there.thrust
-    added = guess[7 : 7 + n] - x[7 : 7 + n]
-    guess[0] -= 0.5 * added[0] * np.sqrt(1.0 + here.eccentricity)
-    guess[7 + n :] -= 0.5 * (added[:-1] + added[1:])
-    return guess
-
-
 def _three_burns(problem: Problem) -> np.ndarray:
-    """Unknowns of three burns: at the wanted thrust, or at a larger one where the way there is open.
-
-    Canonical units.  The larger thrust is the first that serves of a series of ratio 1.5.
-    """
+    """Unknowns of three burns, canonical units, by the first thrust of a series of ratio 1.5 that opens a way."""
     wide = _widened(problem) if problem.eccentricity == 0.0 else problem
     start = wide.with_thrust(max(wide.thrust, GENTLE_THRUST))
     for _ in range(8):
@@ -232,22 +254,23 @@ def _three_burns(problem: Problem) -> np.ndarray:
 
 
 def _with_burn_ahead(problem: Problem, two: np.ndarray) -> np.ndarray | None:
-    """Three-burn unknowns from those of two burns, or None.
+    """Three-burn unknowns, canonical units, from those of two burns, or None.
 
     A short burn one revolution ahead is lengthened until the primer vector is as long at the end of the coast after it
-    as at its start.  Durations in canonical units, the short burn as a fraction of the first of the two.
+    as at its start.
     """
     grow = _SHORT * two[7]
     x = solve(problem, _short_burn_ahead(problem, two, grow), first_burn(problem))
-    last = None
+    last, last_gap = None, 0.0
     while x is not None and x[8] > _SHORT * two[7]:
-        if last is not None and _gap(problem, x) * _gap(problem, last) < 0.0:
-            return _where_lengths_agree(problem, last, x)
+        gap = _gap(problem, x)
+        if last is not None and gap * last_gap < 0.0:  # it vanishes in between
+            return solve(problem, last + last_gap / (last_gap - gap) * (x - last))
         longer = None
         while longer is None and grow > 1e-4 * two[7]:
             longer = _longer(problem, last, x, grow)
             grow = grow if longer is not None else 0.5 * grow
-        last, x = x, longer
+        last, last_gap, x = x, gap, longer
     return None
 
 
@@ -258,43 +281,18 @@ def _gap(problem: Problem, x: np.ndarray) -> float:
 
 
 def _longer(problem: Problem, before: np.ndarray | None, x: np.ndarray, grow: float) -> np.ndarray | None:
-    """The solution with a first burn longer by `grow`; the guess is linear in that burn's duration.
-
-    Canonical units.
-    """
+    """The solution with a first burn longer by `grow`, canonical units; the guess is linear in that burn's duration."""
     guess = x - grow * np.eye(1, x.size, 8)[0] if before is None else x + (x - before) * grow / (x[7] - before[7])
     guess[7] = x[7] + grow
     return solve(problem, guess, first_burn(problem))
 
 
-def _where_lengths_agree(problem: Problem, low: np.ndarray, high: np.ndarray) -> np.ndarray | None:
-    """Between two solutions of opposite gaps: a root of the gap, then all conditions at once.
-
-    Canonical units.
-    """
-
-    def between(share: float) -> np.ndarray | None:
-        """Unknowns solved for from a guess that is a fraction of the way from `low` to `high`."""
-        return solve(problem, low + share * (high - low), first_burn(problem))
-
-    def gap(share: float) -> float:
-        x = between(share)
-        return np.nan if x is None else _gap(problem, x)
-
-    try:
-        x = between(scipy.optimize.brentq(gap, 0.0, 1.0, xtol=1e-9))
-    except ValueError:  # a gap is not a number: there is no solution on the way
-        return None
-    return None if x is None else solve(problem, x)
-
-
 def _short_burn_ahead(problem: Problem, two: np.ndarray, length: float) -> np.ndarray:
-    """Guess of three burns: a short burn one revolution ahead, centred where the primer vector is longest.
+    """Guess of three burns, canonical: a short burn one revolution ahead, centred where the primer vector is longest.
 
-    Lawden (1963), chapter 5: where that length exceeds 1 on a coast, an impulse there saves propellant.  Canonical
-    units; the period is 2 pi a^1.5 of the parking orbit.
+    Lawden (1963), chapter 5: where that length exceeds 1 on a coast, an impulse there saves propellant.
     """
-    period = 2.0 * np.pi / (1.0 - problem.eccentricity) ** 1.5
+    period = 2.0 * np.pi / (1.0 - problem.eccentricity) ** 1.5  # of the parking orbit
     start = first_states(problem, two[None])[0]
     times = np.linspace(-0.5, 2.0, 501)
     after = times[np.argmax(np.linalg.norm(coast(start, times)[:, 6:9], axis=1))]

@@ -18,9 +18,9 @@ import scipy  # loads its packages when they are used
 
 from campaigns.geo_injection.design.coast import coast
 from campaigns.geo_injection.design.powered_arc import fly_burns
+from mc_engine.physics.orbital_elements import state_of_elements
 
 SOLVED = 1e-11  # largest residual of a solution
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 _STEP = 1e-6  # of the differences of the Jacobian, over unknowns of about one
 
 
@@ -49,35 +49,17 @@ class Problem:
         return replace(self, thrust=thrust, flow=thrust / self.exhaust)
 
 
-@dataclass(frozen=True)
-class Solution:
-    """unknowns : place of the first ignition [rad from the node], primer vector and rate there (radial, transverse,
-    normal), durations of the burns, then of the coasts.  states : [2 burns, 12] at the switches."""
-
-    problem: Problem
-    unknowns: np.ndarray
-    states: np.ndarray
-
-    @property
-    def durations(self) -> np.ndarray:
-        """Durations of the burns."""
-        return self.unknowns[7 : 7 + self.problem.burns]
-
-    @property
-    def coasts(self) -> np.ndarray:
-        """Durations of the coasts."""
-        return self.unknowns[7 + self.problem.burns :]
-
-    @property
-    def ignitions(self) -> np.ndarray:
-        """Times of the ignitions after the first."""
-        return np.concatenate([[0.0], np.cumsum(self.durations[:-1] + self.coasts)])
+# durations, coasts, ignitions (after the first): times [burns], [burns - 1], [burns];  states: [2 burns, 12] at the
+# ignitions and cut-offs
+Solution = namedtuple("Solution", "problem durations coasts ignitions states")
 
 
 def unknowns_of(
     problem: Problem, place: float, primer: np.ndarray, rate: np.ndarray, durations: list[float], coasts: list[float]
 ) -> np.ndarray:
-    """The unknowns, see `Solution`; primer vector and rate in the axes of the problem, canonical units."""
+    """What is searched for: place of the first ignition [rad from the node], primer vector and rate there (radial,
+    transverse, normal; given in the axes of the problem), durations of the burns, then of the coasts; canonical units.
+    """
     axes = local_axes(problem.plane_change, np.array([place]))[0]
     return np.array([place, *axes @ primer, *axes @ rate, *durations, *coasts])
 
@@ -104,17 +86,10 @@ def local_axes(plane_change: float, place: np.ndarray) -> np.ndarray:
     return np.moveaxis(np.array(axes), 2, 0)
 
 
-def parking_orbit(problem: Problem, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(places [n, 3], velocities [n, 3]) on the parking orbit at angles [n] from its node.
-
-    Curtis, Orbital Mechanics for Engineering Students, 3rd ed., eqs (2.45), (2.48), (2.49); the perigee radius is 1.
-    """
-    axes = local_axes(problem.plane_change, place)
-    e, anomaly = problem.eccentricity, place - problem.perigee
-    along, across = 1.0 + e * np.cos(anomaly), e * np.sin(anomaly)
-    root = np.sqrt(1.0 + e)  # of the parameter
-    velocity = (across[:, None] * axes[:, 0] + along[:, None] * axes[:, 1]) / root
-    return (1.0 + e) / along[:, None] * axes[:, 0], velocity
+def parking_orbit(problem: Problem, place: np.ndarray) -> np.ndarray:
+    """Place and velocity [n, 6], canonical units, on the parking orbit at angles [n, rad] from its node."""
+    e, perigee = problem.eccentricity, np.full_like(place, problem.perigee)
+    return state_of_elements(1.0 / (1.0 - e), e, problem.plane_change, 0.0, perigee, place - perigee, 1.0).T
 
 
 def first_states(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
@@ -122,7 +97,7 @@ def first_states(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
     axes = local_axes(problem.plane_change, unknowns[:, 0])
     p = np.einsum("nk,nki->ni", unknowns[:, 1:4], axes)
     q = np.einsum("nk,nki->ni", unknowns[:, 4:7], axes)
-    return np.concatenate([*parking_orbit(problem, unknowns[:, 0]), p, q], axis=1)
+    return np.concatenate([parking_orbit(problem, unknowns[:, 0]), p, q], axis=1)
 
 
 def coast_hamiltonian(y: np.ndarray) -> np.ndarray:
@@ -158,11 +133,10 @@ Conditions = Callable[[np.ndarray], np.ndarray]  # zero where they are met: [n, 
 
 
 def searched(conditions: Conditions, guess: np.ndarray, most: int | None = None) -> tuple[np.ndarray, float, int]:
-    """(unknowns near a guess, largest residual, iterations), for unknowns of about one.
+    """(unknowns near a guess, largest residual in the unit of the conditions, iterations), for unknowns of about one.
 
     Levenberg-Marquardt of at most `most` evaluations, then two Newton steps; the Jacobian by central differences over
-    all unknowns at once.  What is not finite counts as far from being met.  The residual is in the
-    unit of the conditions.
+    all unknowns at once.  What is not finite counts as far from being met.
     """
 
     def value(x: np.ndarray) -> np.ndarray:
@@ -170,7 +144,7 @@ def searched(conditions: Conditions, guess: np.ndarray, most: int | None = None)
         return np.where(np.isfinite(left), left, 1e3)
 
     def slope(x: np.ndarray) -> np.ndarray:
-        """Jacobian of the conditions by central differences, in their unit per that of each unknown."""
+        """Jacobian, in the unit of the conditions per that of each unknown."""
         steps = _STEP * np.diag(np.maximum(1.0, np.abs(x)))
         both = conditions(np.concatenate([x + steps, x - steps]))
         return np.nan_to_num((both[: x.size] - both[x.size :]).T / (2.0 * np.diag(steps)))
@@ -193,11 +167,10 @@ def first_burn(problem: Problem) -> Instead:
 
 
 def solve(problem: Problem, guess: np.ndarray, instead: Instead | None = None) -> np.ndarray | None:
-    """Unknowns of the optimum near a guess, or None.
+    """Unknowns of the optimum near a guess, canonical units, or None.
 
     A planar sequence keeps its primer vector in the plane, and may begin anywhere on a circular parking orbit, so that
-    its first place is held at the guess; one of its conditions then follows from the others, which
-    Levenberg-Marquardt does not mind.  Canonical units.
+    its first place is held; one of its conditions follows from the others, which Levenberg-Marquardt does not mind.
     """
     held = np.zeros((3, guess.size))
     if problem.plane_change == 0.0:
@@ -205,7 +178,7 @@ def solve(problem: Problem, guess: np.ndarray, instead: Instead | None = None) -
         held[0, 0] = float(problem.eccentricity == 0.0)
 
     def conditions(x: np.ndarray) -> np.ndarray:
-        """What is zero at the optimum, canonical units: `residuals`, one replaced, and the unknowns that are held."""
+        """`residuals`, one replaced, and the unknowns that are held; canonical units."""
         left = residuals(problem, x)
         if instead is not None:
             left[:, instead[0]] = x[:, instead[1]] - guess[instead[1]]
@@ -218,46 +191,21 @@ def solve(problem: Problem, guess: np.ndarray, instead: Instead | None = None) -
     return x if left < SOLVED and (x[7:] > 0.0).all() else None
 
 
-# A burn or a coast.  t: after the first ignition, [n];  switching: negative where thrust pays, positive where it does
-# not;  hamiltonian: zero on an optimum
-Arc = namedtuple("Arc", "burning t switching hamiltonian")
+def is_optimal(solution: Solution, tolerance: float = 1e-9, n: int = 200) -> bool:
+    """Whether the switching function has its right sign at n instants of each arc: else another burn would pay, or one
+    too many is.
 
-
-def arcs(solution: Solution, n: int = 200) -> list[Arc]:
-    """All arcs in turn, n instants each.
-
-    By eq. (13) of the source with a mass costate l, in canonical units:
-    H = s (k - T |p| / m - flow l) + q.v - p.g with s = 1 on burns, l' = -s T |p| / m^2, and k such that the bracket,
-    the switching function, is zero at the last cut-off.  The mass costate l is 0 at the end, so the arcs are found from
-    the last to the first; its rate is integrated by Gauss's rule.
+    It is S = k - T |p| / m - flow l, with a constant k, and S + q.v - p.g = 0 on burns: eq. (13) of the source with its
+    mass costate l, canonical units.  On coasts m and l rest, and S is zero at the start.
     """
-    problem, states = solution.problem, solution.states
-    masses = 1.0 - problem.flow * np.concatenate([[0.0], np.cumsum(solution.durations)])
-    costate, found = np.zeros(1), []
-
-    def keep(burning: bool, t: np.ndarray, y: np.ndarray, mass: float | np.ndarray) -> None:
-        """Append an arc: switching function and Hamiltonian at its states [n, 12], canonical units."""
-        push = problem.thrust * np.linalg.norm(y[:, 6:9], axis=1) / mass
-        switching = problem.thrust / masses[-1] - push - problem.flow * costate
-        found.append(Arc(burning, t, switching, burning * switching + coast_hamiltonian(y)))
-
-    for k in reversed(range(problem.burns)):
-        start, duration, ignition = states[2 * k], solution.durations[k], solution.ignitions[k]
-        t = np.linspace(0.0, duration, n)
-        half = 0.5 * (duration - t[:, None])
-        times = (duration - half + half * _POINTS).ravel()  # [n * 48], from each instant to the cut-off
-        primer = fly_burns(start, masses[k], times, problem.thrust, problem.flow)[:, 6:9]
-        rates = problem.thrust * np.linalg.norm(primer, axis=1) / (masses[k] - problem.flow * times) ** 2
-        costate = costate[0] + (half * _WEIGHTS * rates.reshape(n, -1)).sum(axis=1)
-        flown = fly_burns(start, masses[k], t, problem.thrust, problem.flow)
-        keep(True, ignition + t, flown, masses[k] - problem.flow * t)
+    problem, y, mass = solution.problem, solution.states, 1.0
+    for k, duration in enumerate(solution.durations):
         if k > 0:
-            t = np.linspace(0.0, solution.coasts[k - 1], n)
-            costate = costate[:1]
-            keep(False, ignition - t[-1] + t, coast(states[2 * k - 1], t), masses[k])
-    return found[::-1]
-
-
-def is_optimal(solution: Solution, tolerance: float = 1e-9) -> bool:
-    """Whether the switching function has its right sign all along: else another burn would pay, or one too many is."""
-    return all(bool(((arc.switching if arc.burning else -arc.switching) < tolerance).all()) for arc in arcs(solution))
+            size = np.linalg.norm(coast(y[2 * k - 1], np.linspace(0.0, solution.coasts[k - 1], n))[:, 6:9], axis=1)
+            if (problem.thrust * (size - size[0]) / mass > tolerance).any():
+                return False
+        burn = fly_burns(y[2 * k], mass, np.linspace(0.0, duration, n), problem.thrust, problem.flow)
+        if (coast_hamiltonian(burn) < -tolerance).any():
+            return False
+        mass -= problem.flow * duration
+    return True

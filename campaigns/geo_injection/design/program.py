@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from pydantic import Field, StrictBool, TypeAdapter
 
 from campaigns.geo_injection.design.continuation import optimum
 from campaigns.geo_injection.design.optimal import is_optimal
@@ -29,6 +30,7 @@ DESIGN = 1  # of the method and the file: programs with another number are not t
 DEGREE = 11
 _LONGEST = 2.5  # canonical time of a segment: the fit is then good to 1e-7 rad
 _NODES = 24  # instants that a segment is fitted to
+Powers = Annotated[list[float], Field(min_length=DEGREE + 1, max_length=DEGREE + 1)]
 
 
 @dataclass(frozen=True)
@@ -37,9 +39,9 @@ class Segment:
 
     start_s: float
     length_s: float
-    x: list[float]
-    y: list[float]
-    z: list[float]
+    x: Powers
+    y: Powers
+    z: Powers
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class BurnProgram:
     duration_s: float
     direction_error_rad: float
     end: list[float]
-    segments: list[Segment]
+    segments: Annotated[list[Segment], Field(alias="segment")]
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,8 @@ class Program:
 
     sequence: Sequence
     start: list[float]
-    burns: list[BurnProgram]
-    optimal: bool
+    burns: Annotated[list[BurnProgram], Field(alias="burn")]
+    optimal: StrictBool
 
 
 def new_design(sequence: Sequence) -> Program:
@@ -85,8 +87,7 @@ def new_design(sequence: Sequence) -> Program:
 def program_for(sequence: Sequence) -> Program:
     """The program of a sequence: one that is kept beside the campaign, one designed before, or a new design."""
     for file in sorted(KEPT.glob("*.toml")):
-        # a file that is absent or broken is no program: it is designed again
-        with suppress(OSError, ValueError, KeyError, TypeError):
+        with suppress(OSError, ValueError):  # a file that is absent or broken is no program: it is designed again
             program = from_text(file.read_text(encoding="utf-8"))
             if program.sequence == sequence:
                 return program
@@ -146,19 +147,8 @@ def _lines(values: dict[str, Any]) -> list[str]:
 
 
 def from_text(text: str) -> Program:
-    """The program that `to_text` wrote; ValueError, KeyError or TypeError where it is another file."""
+    """The program that `to_text` wrote; ValueError where it is another file."""
     record = tomllib.loads(text)
-    if record["design"] != DESIGN:
+    if record.get("design") != DESIGN:
         raise ValueError("a program of another design")
-    inputs = record["sequence"]
-    sequence = Sequence(**{**inputs, "between": tuple(tuple(orbit) for orbit in inputs["between"])})
-    if not isinstance(record["optimal"], bool):
-        raise ValueError("`optimal` is neither true nor false")
-    return Program(sequence, record["start"], [_burn_of(burn) for burn in record["burn"]], record["optimal"])
-
-
-def _burn_of(record: dict[str, Any]) -> BurnProgram:
-    segments = [Segment(**segment) for segment in record["segment"]]
-    if any(len(powers) != DEGREE + 1 for segment in segments for powers in (segment.x, segment.y, segment.z)):
-        raise ValueError(f"a polynomial that is not of degree {DEGREE}")
-    return BurnProgram(**{name: value for name, value in record.items() if name != "segment"}, segments=segments)
+    return TypeAdapter(Program).validate_python(record)

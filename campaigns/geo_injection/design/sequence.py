@@ -60,10 +60,9 @@ class Sequence:
         return tuple(Orbit(a / self.parking_radius, e, max(change - so_far, 0.0)) for a, e, so_far in self.between)
 
     def inertial(self, vectors: np.ndarray) -> np.ndarray:
-        """Vectors [..., 3] of the design's axes (z normal to the final orbit) in axes with z to the north pole.
+        """Vectors [..., 3] of the design's axes (z normal to the final orbit), in their unit, with z to the north pole.
 
-        A rotation about x by the final inclination, in the vectors' own unit.  Designs have an inclination that falls;
-        one that rises is the mirror image.
+        Designs have an inclination that falls; one that rises is the mirror image.
         """
         mirror = -1.0 if self.final_inclination > self.initial_inclination else 1.0
         x, y, z = vectors[..., 0], vectors[..., 1], mirror * vectors[..., 2]

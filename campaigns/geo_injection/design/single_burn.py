@@ -58,7 +58,7 @@ def circle(radius: float) -> Conditions:
     """The circle in the plane z = 0: eq. (17) for the angular momentum, and the two speeds."""
 
     def reached(r: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """What is zero on the circle: (17) and the two speeds, in the unit of its angular momentum."""
+        """(17) and the two speeds, in the unit of the circle's angular momentum."""
         h = np.cross(r, v)
         rate, r2 = (r * v).sum(-1), (r * r).sum(-1)
         conditions = [h[..., 0], h[..., 1], h[..., 2] - np.sqrt(radius), rate, r2 / radius - radius]
@@ -74,11 +74,11 @@ def orbit(a: float, e: float, inclination: float, apse_on_node: bool = True) -> 
     h_wanted = np.sqrt(a * (1.0 - e * e))
 
     def reached(r: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """What is zero on the ellipse, canonical units: (17), twice the energy, and the apse line off the node."""
+        """(17), twice the energy, and the apse line off the node."""
         h = np.cross(r, v)
         r1, v2 = np.sqrt((r * r).sum(-1)), (v * v).sum(-1)
-        rows = [h[..., 0], h[..., 1] + h_wanted * np.sin(inclination), h[..., 2] - h_wanted * np.cos(inclination)]
-        rows.append(v2 - 2.0 / r1 + 1.0 / a)
+        across, normal = h_wanted * np.sin(inclination), h_wanted * np.cos(inclination)
+        rows = [h[..., 0], h[..., 1] + across, h[..., 2] - normal, v2 - 2.0 / r1 + 1.0 / a]
         if apse_on_node:
             apse = (v2 - 1.0 / r1)[..., None] * r - (r * v).sum(-1)[..., None] * v
             rows.append(apse[..., 1] * np.cos(inclination) + apse[..., 2] * np.sin(inclination))
@@ -112,10 +112,8 @@ def _residuals(stage: Stage, x: np.ndarray) -> np.ndarray:
 def fly_shortest(stage: Stage, primer: np.ndarray, rate: np.ndarray, duration: float, ignition: float) -> Burn:
     """The burn of least time near a guess of the primer vector and its rate at ignition; ModelError if none is found.
 
-    The guess fixes directions and a ratio; the size follows from H = 0.  Multipliers of the end conditions begin at
-    the values that fit the guessed end best.
-
-    The conditions are eqs (9)-(17) of the source, solved by Levenberg-Marquardt and two Newton steps.
+    By eqs (9)-(17) of the source.  The guess fixes directions and a ratio; the size follows from H = 0.  Multipliers of
+    the end conditions begin at the values that fit the guessed end best.
     """
     size = float(np.linalg.norm(primer))
     m = stage.reached(stage.reference[:3], stage.reference[3:]).size

@@ -15,24 +15,20 @@ from campaigns.geo_injection.design.coast import coast
 from campaigns.geo_injection.design.optimal import Problem, parking_orbit
 from campaigns.geo_injection.design.single_burn import Burn, Stage, circle, fly_shortest, orbit, rise_guess
 from mc_engine.errors import ModelError
+from mc_engine.physics.orbital_elements import state_of_elements
 
 
 @dataclass(frozen=True)
 class Orbit:
-    """An orbit between two burns: semi-major axis, eccentricity, inclination against the final orbit."""
+    """An orbit between two burns: semi-major axis, eccentricity, inclination [rad] against the final orbit."""
 
     a: float
     e: float
     inclination: float
 
-    def apsis(self, side: float) -> np.ndarray:
-        """Place and velocity [6] at perigee (side 1.0, on the ascending node) or apogee (-1.0, on the descending one).
-
-        The vis-viva equation at r = a (1 - side e), in canonical units.
-        """
-        r, i = self.a * (1.0 - side * self.e), self.inclination
-        speed = np.sqrt((1.0 + side * self.e) / r)
-        return side * np.array([r, 0.0, 0.0, 0.0, speed * np.cos(i), speed * np.sin(i)])
+    def apsis(self, anomaly: float) -> np.ndarray:
+        """Place and velocity [6] at perigee (0, on the ascending node) or apogee (pi, on the descending one)."""
+        return state_of_elements(self.a, self.e, self.inclination, 0.0, 0.0, anomaly, 1.0)
 
 
 # ignition: time after the first;  burn: as `single_burn` found it
@@ -40,9 +36,9 @@ StagedBurn = namedtuple("StagedBurn", "ignition burn")
 
 
 def staged(problem: Problem, between: tuple[Orbit, ...]) -> list[StagedBurn]:
-    """The burns over the given intermediate orbits; ModelError where one is not found, without saying which.
+    """The burns over the given orbits, canonical units; ModelError where one is not found, without saying which.
 
-    Canonical units, times from the first ignition; a wait to the next apsis by eqs (24)-(26) of the source.
+    A last burn that is not found from an impulse at the apsis is guessed by eq. (23).
     """
     circle_first = problem.eccentricity == 0.0
     if not circle_first and abs(np.sin(0.5 * problem.perigee)) > 1e-9:
@@ -51,26 +47,32 @@ def staged(problem: Problem, between: tuple[Orbit, ...]) -> list[StagedBurn]:
             'parking_argument_of_perigee_deg = 0, or method = "optimal"'
         )
     burns: list[StagedBurn] = []
-    mass, reference, lead = 1.0, np.concatenate(parking_orbit(problem, np.zeros(1)), axis=1)[0], 0.0
+    mass, reference, lead = 1.0, parking_orbit(problem, np.zeros(1))[0], 0.0
     for k, new in enumerate(between):
         placing = "free" if k == 0 and circle_first else "centred"
         reached = orbit(new.a, new.e, new.inclination)
         stage = Stage(reference, mass, problem.thrust, problem.flow, reached, placing)
-        burn = shortest(stage, float(np.linalg.norm(new.apsis(1.0)[3:])), new.inclination)
+        burn = shortest(stage, float(np.linalg.norm(new.apsis(0.0)[3:])), new.inclination)
         ignition = lead + burn.ignition if burns else 0.0
         burns.append(StagedBurn(ignition, burn))
         mass -= problem.flow * burn.duration
         wait, reference = _next_apsis(burn.end, apogee=k == len(between) - 1)
         lead = ignition + burn.duration + wait
-    last = _last(Stage(reference, mass, problem.thrust, problem.flow, circle(problem.ratio)), problem.ratio)
+    stage = Stage(reference, mass, problem.thrust, problem.flow, circle(problem.ratio))
+    try:
+        last = shortest(stage, -np.sqrt(1.0 / problem.ratio), 0.0)
+    except ModelError:
+        if np.linalg.norm(reference[:3]) >= problem.ratio:  # no rise: eq. (23) has no real root
+            raise
+        last = rising(stage, problem.ratio)
     return [*burns, StagedBurn(lead + last.ignition, last)]
 
 
 def shortest(stage: Stage, wanted: float, inclination: float) -> Burn:
-    """The burn, guessed as an impulse at the reference that gives the wanted speed; the rocket equation times it.
+    """The burn, guessed as an impulse at the reference that gives the wanted speed, canonical, at an inclination [rad].
 
-    The impulse is centred in the burn, unless the burn is to be ignited at the reference.  Canonical units; the rocket
-    equation is eq. (1) of the source, integrated; inclination [rad].
+    The rocket equation, (1) of the source integrated, times it.  The impulse is centred in the burn, unless the burn is
+    to be ignited at the reference.
     """
     r, v = stage.reference[:3], stage.reference[3:]
     change = wanted * np.array([0.0, np.cos(inclination), np.sin(inclination)]) - v
@@ -80,16 +82,6 @@ def shortest(stage: Stage, wanted: float, inclination: float) -> Burn:
     rate = np.cross(np.cross(r, v) / (r @ r), primer)  # the thrust turns with the local horizon
     ignition = 0.0 if stage.placing == "fixed" else -0.5 * duration
     return fly_shortest(stage, primer - 0.5 * duration * rate, rate, duration, ignition)
-
-
-def _last(stage: Stage, radius: float) -> Burn:
-    """The burn into the final circle: guessed as an impulse or, if nothing is found so, by eq. (23)."""
-    try:
-        return shortest(stage, -np.sqrt(1.0 / radius), 0.0)
-    except ModelError:
-        if np.linalg.norm(stage.reference[:3]) >= radius:  # no rise: eq. (23) has no real root
-            raise
-        return rising(stage, radius)
 
 
 def rising(stage: Stage, radius: float) -> Burn:

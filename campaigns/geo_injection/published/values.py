@@ -1,19 +1,42 @@
-"""Our values of the example of table 1, of the searches, of the optimum's totals and of the engine.
+"""Our values of the burns, of the example of table 1, of the searches, of the optimum's totals and of the engine.
 
 M. Alavipour, A. A. Nikkhah, J. Roshanian.  The records of `*.toml` name these functions; each returns its value in the
 unit of the record.
+
+The burns of tables 2 to 8 are computed one by one, in the source's own conventions, between the orbits that it prints:
+each takes the least time from its old orbit to its new one.  The mass at its ignition is what the printed propellant of
+the burns before it leaves.
+
+- The first burn is ignited on the node of the parking orbit; size, shape and inclination of the new orbit and its node
+  are given, its apse line is free.
+- A second burn at perigee is centred in time on the perigee of the printed orbit, which is on the node; the apse line
+  of the new orbit is free.
+- The last burn, to the geostationary circle, begins where it lasts shortest about the apogee of the printed orbit,
+  which is on the node.
+
+So the printed burns do not make one continuous flight, and neither do these.
 """
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from campaigns.geo_injection.design.kept_programs import SEQUENCES
 from campaigns.geo_injection.design.program import program_for
-from campaigns.geo_injection.design.single_burn import Burn, Rise, Stage, circle, fly_shortest, rise_guess
-from campaigns.geo_injection.design.staged import staged
-from campaigns.geo_injection.published.burns import USED_KG, printed_orbits
+from campaigns.geo_injection.design.sequence import source_orbits
+from campaigns.geo_injection.design.single_burn import Burn, Rise, Stage, circle, fly_shortest, orbit, rise_guess
+from campaigns.geo_injection.design.staged import Orbit, shortest, staged
 from mc_engine.physics.constants import MU_EARTH, STANDARD_GRAVITY
+
+# propellant [kg] used by the end of each burn but the last: tables 2, 3, 4, 7 and 8
+USED_KG = {
+    "two_burns_28_5": [12_683.0],
+    "two_burns_55": [12_772.0],
+    "two_burns_planar": [12_480.0],
+    "three_burns_28_5": [6022.4, 6022.4 + 6429.8],
+    "three_burns_planar": [5554.6, 5554.6 + 6429.5],
+}
 
 # The example of table 1: a satellite near the geostationary circle evades by a small rise in one burn.  The source
 # gives "42178 km" without saying of which circle; what its analytic row determines is RISE.
@@ -22,6 +45,45 @@ RISE = 0.138454  # canonical rise over the acceleration
 _STEP = 0.002  # canonical: the thrust turns over in the middle of the burn, within a hundredth of the time
 _ACCELERATION = THRUST / MASS / (MU_EARTH / RADIUS**2)  # over the first weight, the f of eq. (18)
 _FLOW = MASS_FLOW / MASS * float(np.sqrt(RADIUS**3 / MU_EARTH))
+
+
+def printed_orbits(sequence: str) -> tuple[Orbit, ...]:
+    """The orbits between the burns of a sequence of USED_KG, in canonical units."""
+    flown = SEQUENCES[sequence]
+    return replace(flown, between=source_orbits(flown.burns, flown.initial_inclination)).orbits_between()
+
+
+def burn_s(sequence: str, number: int | None = None) -> float:
+    """Least time [s] of a burn of a sequence, counted from 1, or of all its burns."""
+    numbers = range(1, SEQUENCES[sequence].burns + 1) if number is None else [number]
+    return SEQUENCES[sequence].time_unit * sum(_burn(sequence, burn).duration for burn in numbers)
+
+
+def burn_propellant_kg(sequence: str, number: int | None = None) -> float:
+    """Propellant [kg] of that burn, or of all."""
+    return SEQUENCES[sequence].mass_flow * burn_s(sequence, number)
+
+
+def burn_share_pct(larger: str, smaller: str, number: int | None = None) -> float:
+    """By how much [%] a burn, or all of them, is shorter in another sequence; tables 4 to 6 and 8."""
+    return 100.0 * (1.0 - burn_s(smaller, number) / burn_s(larger, number))
+
+
+@lru_cache
+def _burn(sequence: str, number: int) -> Burn:
+    """The burn of least time, searched from an impulse at the apsis; canonical units."""
+    problem, between = SEQUENCES[sequence].problem(), printed_orbits(sequence)
+    before = (Orbit(1.0, 0.0, problem.plane_change), *between)[number - 1]
+    mass = 1.0 - (0.0, *USED_KG[sequence])[number - 1] / SEQUENCES[sequence].mass
+    if number > len(between):
+        reached, placing, inclination = circle(problem.ratio), "free", 0.0
+        start, wanted = before.apsis(np.pi), -np.sqrt(1.0 / problem.ratio)
+    else:
+        new, placing = between[number - 1], "fixed" if number == 1 else "centred"
+        reached, inclination = orbit(new.a, new.e, new.inclination, apse_on_node=False), new.inclination
+        start = before.apsis(0.0)
+        wanted = np.sqrt(2.0 / np.linalg.norm(start[:3]) - 1.0 / new.a)  # vis-viva
+    return shortest(Stage(start, mass, problem.thrust, problem.flow, reached, placing), wanted, inclination)
 
 
 @lru_cache
@@ -56,14 +118,9 @@ def _iterations() -> list[int]:
     return [stage.burn.iterations for stages in flown for stage in stages]
 
 
-def most_iterations() -> int:
-    """Most steps a burn takes; text on the solution."""
-    return max(_iterations())
-
-
-def fewest_iterations() -> int:
-    """Fewest steps a burn takes; text on the solution."""
-    return min(_iterations())
+def iterations(which: str) -> int:
+    """The least or the most of these steps; text on the solution.  which : "least" or "most"."""
+    return {"least": min, "most": max}[which](_iterations())
 
 
 def optimal_burns_s(sequence: str) -> float:

@@ -5,8 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from campaigns.geo_injection.design.continuation import optimum
-from campaigns.geo_injection.design.impulsive import propellant_share, two_impulses
+from campaigns.geo_injection.design.continuation import optimum, propellant_share, two_impulses
 from campaigns.geo_injection.design.kept_programs import SEQUENCES
 from campaigns.geo_injection.design.staged import Orbit, staged
 from tests.campaigns.model_flights import ModelFlights

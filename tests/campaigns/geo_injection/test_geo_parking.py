@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from geo_arcs import arcs
 from geo_impulses import least_speed
 from geo_sequences import ELLIPTIC, elements, fly_one, impulses_kg, sequence, used_kg
 from geo_twin import assert_same, ends, fly_twin
 
-from campaigns.geo_injection.design.continuation import optimum
-from campaigns.geo_injection.design.impulsive import two_impulses
-from campaigns.geo_injection.design.optimal import arcs, first_states
+from campaigns.geo_injection.design.continuation import optimum, two_impulses
+from campaigns.geo_injection.design.optimal import first_states
 from campaigns.geo_injection.design.program import program_for
 
 

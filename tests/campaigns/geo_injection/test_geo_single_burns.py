@@ -9,8 +9,7 @@ from geo_sequences import GEO, MASS, MU, PARKING, SOURCE, sequence, staged_over
 from campaigns.geo_injection.design.coast import coast
 from campaigns.geo_injection.design.single_burn import Stage, circle, fly_shortest, rise_guess
 from campaigns.geo_injection.design.staged import rising
-from campaigns.geo_injection.published.burns import burn_s
-from campaigns.geo_injection.published.values import avoidance
+from campaigns.geo_injection.published.values import avoidance, burn_s
 
 
 @pytest.mark.parametrize(
