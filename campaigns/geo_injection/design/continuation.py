@@ -214,12 +214,14 @@ def _follow(start: Problem, end: Problem, x: np.ndarray, instead: Instead | None
     last: tuple[float, np.ndarray] | None = None
     while done < 1.0:
         share = min(1.0, done + step)
-        guess = x if last is None else x + (share - done) / (done - last[0]) * (x - last[1])
-        solution = solve(_between(start, end, share), guess, instead)
+        here, there = _between(start, end, done), _between(start, end, share)
+        line = x if last is None else x + (share - done) / (done - last[0]) * (x - last[1])
+        guess = _longer_burns(here, there, x) if last is None else line
+        solution = solve(there, guess, instead)
         if solution is None or np.abs(solution - guess).max() > _FAR * max(1.0, np.abs(solution - x).max()):
             step *= 0.5
             if step < _LEAST_STEP:
-                raise ModelError(_how_far(_between(start, end, done), end, x))
+                raise ModelError(_how_far(here, end, x))
             continue
         last, x, done, step = (done, x), solution, share, min(1.5 * step, _LONGEST_STEP)
     return x
@@ -238,6 +240,20 @@ def _how_far(here: Problem, end: Problem, x: np.ndarray) -> str:
     return f"the search for the optimal {end.burns} burns stopped at {', '.join(where[:-1])} and {where[-1]}; {advice}"
 
 
+def _longer_burns(here: Problem, there: Problem, x: np.ndarray) -> np.ndarray:
+    """The same sequence with burns longer by what the thrust is smaller, about the same middles.
+
+    The burn times scale with 1 / thrust; sqrt(1 + e) is the rate of the place at perigee, in canonical
+    units.
+    """
+    n, guess = here.burns, x.copy()
+    guess[7 : 7 + n] *= here.thrust / there.thrust
+    added = guess[7 : 7 + n] - x[7 : 7 + n]
+    guess[0] -= 0.5 * added[0] * np.sqrt(1.0 + here.eccentricity)
+    guess[7 + n :] -= 0.5 * (added[:-1] + added[1:])
+    return guess
+
+
 def _three_burns(problem: Problem) -> np.ndarray:
     """Unknowns of three burns, canonical units, by the first thrust of a series of ratio 1.5 that opens a way."""
     wide = _widened(problem) if problem.eccentricity == 0.0 else problem
@@ -254,23 +270,22 @@ def _three_burns(problem: Problem) -> np.ndarray:
 
 
 def _with_burn_ahead(problem: Problem, two: np.ndarray) -> np.ndarray | None:
-    """Three-burn unknowns, canonical units, from those of two burns, or None.
+    """Three-burn unknowns from those of two burns, or None.
 
     A short burn one revolution ahead is lengthened until the primer vector is as long at the end of the coast after it
-    as at its start.
+    as at its start.  Durations in canonical units, the short burn as a fraction of the first of the two.
     """
     grow = _SHORT * two[7]
     x = solve(problem, _short_burn_ahead(problem, two, grow), first_burn(problem))
-    last, last_gap = None, 0.0
+    last = None
     while x is not None and x[8] > _SHORT * two[7]:
-        gap = _gap(problem, x)
-        if last is not None and gap * last_gap < 0.0:  # it vanishes in between
-            return solve(problem, last + last_gap / (last_gap - gap) * (x - last))
+        if last is not None and _gap(problem, x) * _gap(problem, last) < 0.0:
+            return _where_lengths_agree(problem, last, x)
         longer = None
         while longer is None and grow > 1e-4 * two[7]:
             longer = _longer(problem, last, x, grow)
             grow = grow if longer is not None else 0.5 * grow
-        last, last_gap, x = x, gap, longer
+        last, x = x, longer
     return None
 
 
@@ -285,6 +300,27 @@ def _longer(problem: Problem, before: np.ndarray | None, x: np.ndarray, grow: fl
     guess = x - grow * np.eye(1, x.size, 8)[0] if before is None else x + (x - before) * grow / (x[7] - before[7])
     guess[7] = x[7] + grow
     return solve(problem, guess, first_burn(problem))
+
+
+def _where_lengths_agree(problem: Problem, low: np.ndarray, high: np.ndarray) -> np.ndarray | None:
+    """Between two solutions of opposite gaps: a root of the gap, then all conditions at once.
+
+    Canonical units.
+    """
+
+    def between(share: float) -> np.ndarray | None:
+        """Unknowns solved for from a guess that is a fraction of the way from `low` to `high`."""
+        return solve(problem, low + share * (high - low), first_burn(problem))
+
+    def gap(share: float) -> float:
+        x = between(share)
+        return np.nan if x is None else _gap(problem, x)
+
+    try:
+        x = between(scipy.optimize.brentq(gap, 0.0, 1.0, xtol=1e-9))
+    except ValueError:  # a gap is not a number: there is no solution on the way
+        return None
+    return None if x is None else solve(problem, x)
 
 
 def _short_burn_ahead(problem: Problem, two: np.ndarray, length: float) -> np.ndarray:
