@@ -11,7 +11,7 @@ from campaigns.geo_servicing.dynamics import MU, R0, State
 from campaigns.geo_servicing.inputs import BURN_NUMBERS, CHOICES, Inputs
 from campaigns.geo_servicing.phasing_plan import plan_of
 from mc_engine.errors import ModelError
-from mc_engine.model import AdaptiveStep, Parameter, Refusals, kept_design, model, prepared
+from mc_engine.model import AdaptiveStep, Parameter, Refusals, declared_in, kept_design, model, prepared
 from mc_engine.model.figures import HistoryFigure, ProfileFigure, ScatterFigure
 from mc_engine.physics.constants import STANDARD_GRAVITY
 from mc_engine.physics.frames import TURN
@@ -153,22 +153,11 @@ MODEL = model(
     title="Servicing a geostationary satellite",
     source=SOURCE,
     inputs=Inputs,
-    states=State,
-    outputs=outcome.Outputs,
-    metrics=outcome.Metrics,
     clock=AdaptiveStep("duration", "tolerance", dynamics.tolerances(1e-4, 1e-8), control_period=sample_period),
     kernel_parameters=Parameters,
     prepare=prepare,
-    initial=dynamics.initial,
-    start=corrections.start,
-    control=navigation.control,
     tables=tables,
-    rhs=dynamics.rhs,
-    events=corrections.EVENTS,
-    switch=corrections.switch,
-    observe=outcome.observe,
-    evaluate=outcome.evaluate,
-    extrema=outcome.EXTREMA,
+    **declared_in(dynamics, corrections, navigation, outcome),
     figures=FIGURES,
     published=read_published(Path(__file__).with_name("published.toml")),
 )

@@ -13,7 +13,7 @@ from campaigns.reentry.guidance import laws
 from campaigns.reentry.guidance.plan import planned_entry, plans_of
 from campaigns.reentry.guidance.reference import stored_references
 from campaigns.reentry.inputs import CHOICES, Inputs
-from mc_engine.model import AdaptiveStep, Event, Refusals, figures, model, prepared
+from mc_engine.model import AdaptiveStep, Event, Refusals, declared_in, figures, model, prepared
 from mc_engine.studies.published import read_published
 
 SOURCE = (
@@ -154,9 +154,6 @@ MODEL = model(
     title="Atmospheric entry",
     source=SOURCE,
     inputs=Inputs,
-    states=dynamics.State,
-    outputs=outcome.Outputs,
-    metrics=outcome.Metrics,
     clock=AdaptiveStep(
         "time_limit",
         "tolerance",
@@ -168,10 +165,6 @@ MODEL = model(
     kernel_parameters=prepared(prepare, Inputs),
     prepare=prepare,
     tables=lambda o: np.zeros(FIRST),  # nothing is shared: reference paths and air are those of `prepare`
-    initial=dynamics.initial,
-    start=dynamics.start,
-    control=laws.control,
-    rhs=dynamics.rhs,
     events={
         "pressure_peak": Event(crossings, "falling", "switch"),
         "heat_peak": Event(crossings, "falling", "switch"),
@@ -182,9 +175,7 @@ MODEL = model(
         "left": Event(crossings, "rising", "stop", rare=True),
         "over": Event(crossings, "falling", "stop", rare=True),
     },
-    switch=dynamics.switch,
-    observe=outcome.observe,
-    evaluate=outcome.evaluate,
+    **declared_in(dynamics, laws, outcome),
     figures=FIGURES,
     published=read_published(Path(__file__).with_name("published.toml")),
 )
