@@ -212,7 +212,7 @@ def test_a_clock_before_1970_makes_no_pdf_and_says_so(monkeypatch):
 
     monkeypatch.setattr(pdf.time, "time", lambda: -1.0)
     with pytest.raises(EngineError, match="the clock of this computer stands before 1970"):
-        pdf.render_pdf(None)
+        pdf.typeset("{}")
 
 
 # ---- copies of the run upstream, parts

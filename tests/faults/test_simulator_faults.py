@@ -15,7 +15,7 @@ from mc_engine import load_campaign, resume, run
 from tests.mc_engine.flight.falling_ball import program_campaign, python_campaign
 
 SAMPLE, WHOLE = (4, 50), (100, 250)  # cases with a fault, of so many: in the deep tests and in the slow ones
-SAMPLE_KILLS, WHOLE_KILLS = (("case", 3), ("program", 30), ("case", 90)), 50  # of the engine, after so many cases
+SAMPLE_KILLS, WHOLE_KILLS = (("case", 3), ("program", 30)), 50  # of the engine, after so many cases
 PYTHON_FAULTS = {
     "segfault": ("import ctypes\n    ctypes.string_at(0)", "crashed", "ended by SIGSEGV at "),
     "kill": ("import os\n    os.kill(os.getpid(), 9)", "crashed", "ended by SIGKILL"),

@@ -27,7 +27,7 @@ def test_the_best_two_impulses_from_a_circle_are_those_at_the_node():
 ELLIPSES = [
     (2, {"inclination_deg": 46.0, "e": 0.2, "perigee_deg": 20.0}),
     (3, {"inclination_deg": 28.5, "e": 0.25, "perigee_deg": 170.0, "altitude_km": 500.0}),
-    (2, {"inclination_deg": 0.0, "e": 0.4, "perigee_deg": 77.0, "thrust": 8000.0}),
+    pytest.param(2, {"inclination_deg": 0.0, "e": 0.4, "perigee_deg": 77.0, "thrust": 8000.0}, marks=pytest.mark.slow),
 ]
 
 

@@ -153,7 +153,7 @@ LINES = [
     ("g = g * p.burn_dv_m_s", "a column's name is without its unit in physics, \"burn_dv\"$"),
     ("g = s.x(2.0)", "a number is not callable; write it with"),
     ("g = g + 0.0 * o.foo", "has no attribute 'foo'"),
-    ("g = g * tan(s.x)", "name 'tan' is not defined; write it with"),
+    ("g = g * tan(s.x)", "name 'tan' is not defined; import it from mc_engine.lanes"),
     ("n, _ = normal_pair(t, 0)", ALLOWED, "from mc_engine.lanes.noise import normal_pair"),
     (f"for k in range(0):\n    top = g\ng = g + top{HERE}", "cannot access local variable 'top'"),
     (DERIVATIVE.strip().replace(", vy=g * s.y", ""), "State(...) leaves out 'vy'; give every field"),
