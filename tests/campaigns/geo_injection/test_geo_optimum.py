@@ -38,6 +38,14 @@ def test_the_hamiltonian_is_zero_along_every_arc_and_thrust_pays_exactly_where_i
     assert is_optimal(solution(burns, inclination))
 
 
+def test_two_burns_of_a_weak_thrust_are_told_from_an_optimum():
+    """Within the long first burn thrust does not pay: two burns in its place save propellant."""
+    two = solution(2, 60.0, 5e3)
+    assert not is_optimal(two)
+    assert arcs(two)[0].switching.max() > 1e-3
+    assert is_optimal(solution(3, 60.0, 5e3))
+
+
 def test_the_first_burn_is_about_the_ascending_node():
     for burns, inclination, *_ in TOTALS[:2]:
         start, end = solution(burns, inclination).states[:2]
