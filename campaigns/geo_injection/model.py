@@ -65,7 +65,8 @@ def tables(o: Any) -> np.ndarray:
 def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
     """Kernel parameters of each case, SI; cases of one sequence are prepared together."""
     codes = np.column_stack(list(vars(settings).values()))
-    states, durations, ignitions = np.zeros((6, len(codes))), np.zeros((3, len(codes))), np.full((3, len(codes)), 1e300)
+    states, durations = np.zeros((6, len(codes))), np.zeros((3, len(codes)))
+    ignitions = np.full((3, len(codes)), 1e300)  # [s]; it stays for a burn that the sequence does not have
     # usually all cases have one sequence, and sorting their rows takes longer than flying the cases
     for row in codes[:1] if (codes == codes[:1]).all() else np.unique(codes, axis=0):
         same = (codes == row).all(axis=1)

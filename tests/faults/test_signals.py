@@ -18,7 +18,7 @@ from mc_engine.runner import runner
 from mc_engine.store.verification import damage
 
 CASES = 3200  # sixteen chunks for two workers
-GONE_WITHIN_S = 100.0
+GONE_WITHIN_S = 20.0
 
 
 def begin(folder, backend, sleep_s, awaited="run/cases/part-*"):
