@@ -125,9 +125,9 @@ def test_a_template_that_gives_no_text_costs_its_case_and_is_named(tmp_path, nam
     lines = f"{{% if case_id == 2 %}}{template}{{% endif %}}\n"
     deck = tmp_path / "ball/case.txt.j2"
     deck.write_text(deck.read_text() + lines)
-    begin = time.process_time()
+    begin = time.thread_time()
     campaign = load_campaign(file)
-    assert time.process_time() - begin < 5.0  # nothing in a template is computed before its case is written
+    assert time.thread_time() - begin < 5.0  # nothing in a template is computed before its case is written
     table = run(campaign, tmp_path / "run", workers=2).cases()
     refuse_others(table, (2,), "crashed", reason)
     assert table["reason"][2].startswith("the template of case.txt")
