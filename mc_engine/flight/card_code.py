@@ -14,14 +14,16 @@ is an error.
 
 import re
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
+from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
 import numpy as np
 
 from mc_engine.errors import EngineError
-from mc_engine.lanes.kernel_cache import Form, Kernel, form_of
+from mc_engine.lanes.kernel_cache import Form, Kernel, form_of, kept_or_made
 
 TRIPLE = "nvptx64-nvidia-cuda"
 CAPABILITIES = (80, 90, 100)  # of the cards whose code is written: Ampere, Hopper, Blackwell; later cards run these
@@ -52,12 +54,23 @@ _CHOICE = re.compile(
 
 
 def thread_code(kernel: Kernel, arguments: Sequence[Any]) -> str:
-    """LLVM IR of the entry and of all that it calls, optimised.
+    """LLVM IR of the entry and of all that it calls, optimised; kept on the disk beside the kernel.
 
     kernel : for one case at a time.  arguments : what it is called with; their form counts.
     """
     form = form_of(arguments)
-    name, library = kernel.compiled(form)
+    file = kernel.file(form, "threads", _version())
+    kept, _ = kept_or_made(file, lambda: _made(*kernel.library(form), form).encode())
+    return kept.decode()
+
+
+@cache
+def _version() -> str:
+    """What the code depends on beside the kernel: this module, and the compiler's release."""
+    return f"{llvm.llvm_version_info} {sha256(Path(__file__).read_bytes()).hexdigest()}"
+
+
+def _made(name: str, library: Any, form: Form) -> str:
     text = str(library.whole)
     for pattern, plain in _OF_THE_PROCESSOR:
         text = re.sub(pattern, plain, text, flags=re.MULTILINE)

@@ -65,10 +65,18 @@ class Kernel:
                 code = self._codes.get(form) or self._codes.setdefault(form, self._loaded(form))
         return code(arguments)
 
-    def file(self, form: Form) -> Path:
-        """Where the machine code for such arguments is kept on this processor."""
-        what = sha256(repr((form, _target())).encode()).hexdigest()
-        return self._path.with_name(f"{self._path.stem}.{what[:16]}.kernel")
+    def file(self, form: Form, kind: str = "kernel", version: str = "") -> Path:
+        """Where the machine code for such arguments is kept on this processor, or code of another kind and version."""
+        what = sha256((repr((form, _target())) + version).encode()).hexdigest()
+        return self._path.with_name(f"{self._path.stem}.{what[:16]}.{kind}")
+
+    def library(self, form: Form) -> tuple[str, Any]:
+        """(name of the function, its library), from the compiler.  Its machine code is kept, if it was not yet."""
+        with without_collection():
+            name, library = self.compiled(form)
+        if not (file := self.file(form)).exists():
+            save(file, _machine_code(name, library))
+        return name, library
 
     def _loaded(self, form: Form) -> "_MachineCode":
         content, is_new = kept_or_made(self.file(form), lambda: self._content(form))
@@ -78,9 +86,13 @@ class Kernel:
 
     def _content(self, form: Form) -> bytes:
         with without_collection():
-            name, library = self.compiled(form)
-            code: bytes = library.object_file()
-        return json.dumps([name, *library.outside_names]).encode() + b"\n" + code
+            return _machine_code(*self.compiled(form))
+
+
+def _machine_code(name: str, library: Any) -> bytes:
+    """What the file of a kernel holds."""
+    code: bytes = library.object_file()
+    return json.dumps([name, *library.outside_names]).encode() + b"\n" + code
 
 
 class _MachineCode:

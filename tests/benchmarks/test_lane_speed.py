@@ -9,6 +9,12 @@ from mc_engine.studies.lane_speed import measure
 
 SLOWER = 1.15  # by chance
 ATTEMPTS = 12  # a neighbour on the machine can spoil several measurements
+FLIGHTS = [
+    (orbit, 60),
+    (flexible, LONG),
+    (sounding_rocket, LONG),
+    pytest.param(deorbit, 60, marks=pytest.mark.slow),
+]
 # of what the registers allow: where thrusters switch, the lanes that do not switch wait for those that do, and a
 # measured 7.0 to 7.1 leaves nothing for a busy machine
 WITH_PULSES = 0.93
@@ -38,7 +44,7 @@ def best_ratio(cases, wanted, repeats):
 
 @pytest.mark.benchmark
 @pytest.mark.skipif(least_ratio() is None, reason="this processor has neither AVX-512 nor AVX2")
-@pytest.mark.parametrize(("cases", "repeats"), [(orbit, 60), (deorbit, 60), (flexible, LONG), (sounding_rocket, LONG)])
+@pytest.mark.parametrize(("cases", "repeats"), FLIGHTS)
 def test_the_lanes_of_a_register_fly_as_many_times_as_fast_as_one_as_the_processor_allows(cases, repeats):
     assert best_ratio(cases, least_ratio(), repeats) >= least_ratio()
 
@@ -51,7 +57,7 @@ def test_and_nearly_so_where_thrusters_switch_at_other_times_in_every_lane():
 
 
 @pytest.mark.benchmark
-@pytest.mark.parametrize(("cases", "repeats"), [(orbit, 60), (deorbit, 60), (flexible, LONG), (sounding_rocket, LONG)])
+@pytest.mark.parametrize(("cases", "repeats"), FLIGHTS)
 def test_as_many_cases_fly_at_a_time_as_are_fastest(cases, repeats):
     flight = cases()
     usual, widths = usual_width(flight.model), (registers().doubles, 2 * registers().doubles)

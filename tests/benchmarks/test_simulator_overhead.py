@@ -45,7 +45,7 @@ def test_a_python_case_costs_little(tmp_path, kind, cases, most_us):
 
 @pytest.mark.benchmark
 def test_cases_of_a_millisecond_keep_the_processors_busy(tmp_path):
-    cases = 50_000
+    cases = 20_000
     wall, spent = seconds(python_campaign(tmp_path / "ball", fault=WAITING), cases, tmp_path)
     plain = without_engine(cases)
     busy, plain_busy = spent / WORKERS / wall, 1e-3 * cases / WORKERS / plain

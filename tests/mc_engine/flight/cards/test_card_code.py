@@ -34,6 +34,7 @@ def code_of(name):
 def test_on_the_processor_the_code_gives_the_bits_of_the_kernel(name):
     call, code = code_of(name)
     call()
+    assert call.func.loads == 1  # the processor's code was kept when the cards' was made
     twin = list(call.args)
     for index in PER_CASE[2:]:
         twin[index] = np.full_like(call.args[index], -7.0)
@@ -78,6 +79,12 @@ def test_the_code_is_the_same_in_every_process():
     ptx = ptx_of(code, CAPABILITIES[0])
     assert "part_" in code
     assert not re.search(r"_ZN|x7f[0-9a-f]{10}", ptx)
+
+
+def test_the_code_is_made_once_and_kept(monkeypatch):
+    call, code = code_of("minimal")
+    monkeypatch.setattr(call.func, "compiled", lambda form: pytest.fail("was compiled again"))
+    assert thread_code(call.func, call.args) == code
 
 
 @pytest.mark.parametrize("operation", ["fdiv afn float %x, %y", "call afn float @llvm.sqrt.f32(float %x)"])
