@@ -63,6 +63,21 @@ def in_c(cases, fault):
     return f"if ({' || '.join(f'id == {case}' for case in cases)}) {{ {fault} }}"
 
 
+def one_of_each(faults):
+    """Fault -> its case, by chance, of SAMPLE."""
+    return dict(zip(faults, np.random.default_rng(21).permutation(SAMPLE[1]).tolist(), strict=False))
+
+
+def refuse_others_than(table, faults, cases):
+    """Every fault costs its own case, with its own status and reason, and no other one."""
+    for name, case in cases.items():
+        (row,) = table[table["case_id"] == case].to_dict("records")
+        _, status, reason = faults[name]
+        assert row["status"] == status, name
+        assert reason in row["reason"], name
+    assert set(table["case_id"][table["status"] != "ok"]) == set(cases.values())
+
+
 def refuse_others(table, cases, status, reason):
     failed = table[table["status"] != "ok"]
     assert tuple(failed["case_id"]) == cases
@@ -84,11 +99,25 @@ def faulty(request):
     return tuple(sorted(np.random.default_rng(21).permutation(cases)[:failing].tolist())), cases
 
 
+LIMITS = "time_limit_s=1.0, memory_limit_mib=2000.0,"
+
+
+def test_every_fault_of_a_function_costs_its_case(tmp_path, sound):
+    cases = one_of_each(PYTHON_FAULTS)
+    fault = "\n".join(at((case,), PYTHON_FAULTS[name][0]) for name, case in cases.items())
+    file = python_campaign(tmp_path / "ball", cases=SAMPLE[1], fault=fault, options=LIMITS)
+    table = run(load_campaign(file), tmp_path / "run", workers=2).cases()
+    refuse_others_than(table, PYTHON_FAULTS, cases)
+    well = (table["status"] == "ok").to_numpy()
+    assert table[well].equals(sound[: SAMPLE[1]][well])
+    assert len(list((tmp_path / "run/simulator").iterdir())) == len(cases)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PYTHON_FAULTS)
-def test_a_fault_of_a_function_costs_its_case(tmp_path, sound, faulty, name):
+def test_a_fault_of_many_calls_of_a_function_costs_their_cases(tmp_path, sound, faulty, name):
     (failing, cases), (fault, status, reason) = faulty, PYTHON_FAULTS[name]
-    limits = "time_limit_s=1.0, memory_limit_mib=2000.0,"
-    file = python_campaign(tmp_path / "ball", cases=cases, fault=at(failing, fault), options=limits)
+    file = python_campaign(tmp_path / "ball", cases=cases, fault=at(failing, fault), options=LIMITS)
     table = run(load_campaign(file), tmp_path / "run", workers=2).cases()
     refuse_others(table, failing, status, reason)
     well = (table["status"] == "ok").to_numpy()
@@ -96,8 +125,20 @@ def test_a_fault_of_a_function_costs_its_case(tmp_path, sound, faulty, name):
     assert len(list((tmp_path / "run/simulator").iterdir())) == len(failing)
 
 
+def test_every_fault_of_a_program_costs_its_case(tmp_path, sound):
+    cases = one_of_each(C_FAULTS)
+    fault = " ".join(in_c((case,), C_FAULTS[name][0]) for name, case in cases.items())
+    file = program_campaign(tmp_path / "ball", cases=SAMPLE[1], fault=fault)
+    table = run(load_campaign(file), tmp_path / "run", workers=2).cases()
+    refuse_others_than(table, C_FAULTS, cases)
+    well = (table["status"] == "ok").to_numpy()
+    assert np.allclose(table[METRICS][well], sound[METRICS][: SAMPLE[1]][well], rtol=1e-12, atol=0.0)
+    assert running(str(tmp_path / "ball")) == []
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", C_FAULTS)
-def test_a_fault_of_a_program_costs_its_case(tmp_path, sound, faulty, name):
+def test_a_fault_of_many_runs_of_a_program_costs_their_cases(tmp_path, sound, faulty, name):
     (failing, cases), (fault, status, reason) = faulty, C_FAULTS[name]
     file = program_campaign(tmp_path / "ball", cases=cases, fault=in_c(failing, fault))
     table = run(load_campaign(file), tmp_path / "run", workers=2).cases()
@@ -154,15 +195,16 @@ HISTORIES = {
 
 
 @pytest.mark.parametrize("options", ["", "batch=True,"], ids=["case", "batch"])
-@pytest.mark.parametrize("name", HISTORIES)
-def test_a_history_that_cannot_be_read_is_no_result(tmp_path, name, options):
-    table, reason = HISTORIES[name]
+def test_a_history_that_cannot_be_read_is_no_result(tmp_path, options):
     one = "np.ones_like(inputs['mass_kg'])"
-    fault = f"return {{'fall_time_s': {one}, 'impact_speed_m_s': {one}}}, {table}"
-    file = python_campaign(tmp_path / "ball", cases=3, fault=fault, options=options)
-    rows = run(load_campaign(file), tmp_path / "run", workers=1).cases()
+    tables = ", ".join(f"lambda: {table}" for table, _ in HISTORIES.values())
+    history = f"[{tables}][int(np.ravel(case.id)[0])]()"
+    fault = f"return {{'fall_time_s': {one}, 'impact_speed_m_s': {one}}}, {history}"
+    file = python_campaign(tmp_path / "ball", cases=len(HISTORIES), fault=fault, options=options)
+    rows = run(load_campaign(file), tmp_path / "run", workers=1, chunk=1).cases()
     assert set(rows["status"]) == {"no-result"}
-    assert all(reason in one for one in rows["reason"])
+    for said, (_, reason) in zip(rows["reason"], HISTORIES.values(), strict=True):
+        assert reason in said
 
 
 def test_a_case_of_a_batch_that_crashes_is_found(tmp_path, sound):

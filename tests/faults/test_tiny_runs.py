@@ -72,7 +72,7 @@ def check(samples, memory_mib, record_property):
 
 
 def test_tiny_runs_leave_nothing_behind(tmp_path, record_property):
-    check(soak(tmp_path, 20.0, "threading", every=3), 4.0, record_property)
+    check(soak(tmp_path, 12.0, "threading", every=3), 4.0, record_property)
 
 
 GAP = pytest.mark.xfail(reason="loky notes each of its pools for the interpreter's exit: three small objects")

@@ -122,6 +122,7 @@ def test_a_flight_finds_sun_and_moon_until_its_end_whenever_it_begins(duration):
     assert (row["end_x_m"] == longer["end_x_m"][:-1]).all()
 
 
+@pytest.mark.slow
 def test_a_case_has_the_same_bits_whatever_the_width():
     inputs = {"phase": "inspection", "duration_days": 3.0, "epoch_utc": "2019-12-11T00:00:00"}
     inputs |= {"thrust_noise_pct": np.full(5, 0.5)}

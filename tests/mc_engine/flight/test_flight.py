@@ -76,7 +76,12 @@ def whole(model, inputs):
 
 
 # The builds of other widths than a run's own take long to compile.
-@pytest.mark.parametrize("width", [None, *(pytest.param(width, marks=pytest.mark.deep) for width in (1, 4, 8, 16))])
+WIDTHS = [
+    pytest.param(width, marks=[pytest.mark.deep if width in (1, 16) else pytest.mark.slow]) for width in (1, 4, 8, 16)
+]
+
+
+@pytest.mark.parametrize("width", [None, *WIDTHS])
 @pytest.mark.parametrize(
     ("chunk", "n_cases", "threads", "shuffled"),
     [(1, 64, 2, False), (7, 203, 1, True), (64, 1000, 2, True), (1000, 1000, 1, True)],

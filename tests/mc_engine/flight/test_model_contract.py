@@ -124,7 +124,7 @@ def test_an_end_inside_a_step_is_named_and_what_is_suggested_fits(tmp_path, step
     assert checked(shorter, until) == []
 
 
-@pytest.mark.parametrize(("method", "limit_s"), [("gj9", 105.0), ("abm12", 70.0)])
+@pytest.mark.parametrize(("method", "limit_s"), [("gj9", 105.0), pytest.param("abm12", 70.0, marks=pytest.mark.slow)])
 def test_steps_beyond_the_limit_of_stability_are_found_though_every_case_is_ok(tmp_path, method, limit_s):
     def checked(step):
         rates = ', rates=(("x", "vx"), ("y", "vy"))' if method == "gj9" else ""

@@ -36,7 +36,7 @@ def day(orbit):
     return flown(orbit, speed_m_s=SPEEDS)
 
 
-@pytest.mark.parametrize("width", [1, 16])
+@pytest.mark.parametrize("width", [pytest.param(1, marks=pytest.mark.slow), 16])
 def test_every_width_gives_the_same_bits(orbit, day, width):
     same_bytes(flown(orbit, width, speed_m_s=SPEEDS), day)
 
