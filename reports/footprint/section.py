@@ -210,7 +210,7 @@ def _region_row(region: Ellipse | DensityRegion, confidence: float) -> tuple[Cel
     low, high = clopper_pearson(region.inside, region.n, confidence)
     inside = (
         Cell(f"{count(region.inside)} / {count(region.n)}", region.inside),
-        Cell(percent(share), share, f"[{percent(low)}, {percent(high)}]"),
+        Cell(percent(share), share, f"[{percent(low)}, {percent(high, up=True)}]"),
     )
     if isinstance(region, DensityRegion):
         return (

@@ -46,7 +46,7 @@ def _because(verdict: Verdict) -> str:
     if verdict.failing:
         return f"{lost}; {verdict.failing_words}"
     if verdict.outcome == "fail":
-        return f"{lost}; the true probability is at most {percent(verdict.upper)}"
+        return f"{lost}; the true probability is at most {percent(verdict.upper, up=True)}"
     alone = not verdict.metric and verdict.outcome != "pass" and verdict.lower >= verdict.share
     but = ", but not every requirement is demonstrated by itself" if alone else ""
     further = (

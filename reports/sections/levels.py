@@ -141,7 +141,7 @@ def _difference_cells(flown: Flown, values: np.ndarray, matched: np.ndarray, pla
         return Cell("–", small=f"0 of {count(difference.n_tried)} pairs"), Cell("–")
     if _pairs_are_draws(flown):
         small = interval(difference.median.lower, difference.median.upper)
-        bounds = f"[{percent(difference.smaller_share[0], 1)}, {percent(difference.smaller_share[1], 1)}]"
+        bounds = f"[{percent(difference.smaller_share[0], 1)}, {percent(difference.smaller_share[1], 1, up=True)}]"
     else:
         small, bounds = f"{number(difference.smallest, 4)} to {number(difference.largest, 4)}", ""
     share = difference.smaller / difference.n_used

@@ -96,7 +96,7 @@ def _bounds_named(flown: Flown) -> str:
 def _requirement_row(flown: Flown, verdict: Verdict, source: str) -> tuple[Cell, ...]:
     unit = flown.unit(verdict.metric)
     lost = f"{count(verdict.no_number)} without a number" if verdict.no_number else ""
-    bounds = f"[{percent(verdict.lower)}, {percent(verdict.upper)}]" if verdict.lower is not None else ""
+    bounds = f"[{percent(verdict.lower)}, {percent(verdict.upper, up=True)}]" if verdict.lower is not None else ""
     needed = f"needs {count(verdict.needed)} cases" if verdict.needed else ""
     asked = f"for {percent(verdict.share, 3)} with {percent(verdict.confidence)} confidence"
     what = "; ".join(filter(None, (flown.words(verdict.metric), of_source(source))))
@@ -171,13 +171,13 @@ def _risk_row(verdict: Verdict, among: int) -> tuple[Cell, ...]:
     if verdict.looked:
         consumer = Cell(f"below {percent(1.0 - verdict.confidence)}", 1.0 - verdict.confidence)
     else:
-        consumer = Cell(percent(verdict.consumer_risk), verdict.consumer_risk)
+        consumer = Cell(percent(verdict.consumer_risk, up=True), verdict.consumer_risk)
     shared = f"with {percent(1.0 - (1.0 - verdict.confidence) / among)} each"
     return (
         Cell(verdict.name, small=verdict.metric),
         Cell(count(outside), outside),
         allowed,
         consumer,
-        Cell(percent(verdict.producer_risk), verdict.producer_risk),
+        Cell(percent(verdict.producer_risk, up=True), verdict.producer_risk),
         Cell(verdict.shared_outcome, small=shared),
     )

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from decimal import Decimal
 from functools import partial
 from itertools import pairwise
-from math import floor, isfinite, log10
+from math import ceil, floor, isfinite, log10
 
 from mc_engine.units import UNITS, unit_suffix
 
@@ -124,13 +124,17 @@ def interval(lower: float | None, upper: float | None, scale: float | None = Non
     return f"[{number(lower, scale=scale)}, {number(upper, scale=scale)}]"
 
 
-def percent(share: float | None, digits: int = 2) -> str:
-    """A share in percent; never rounded up to 100 %, nor more digits than needed near it."""
+def percent(share: float | None, digits: int = 2, up: bool = False) -> str:
+    """A share in percent, rounded down, with more digits where it is near 100 % and no more than needed there.
+
+    up : rounded up, as an upper bound and a risk are.
+    """
     if share is None:
         return "–"
     while 0.0 < 1.0 - share < 0.5 * 10.0 ** -(digits + 2) and digits < 8:
         digits += 1
-    scaled = floor(share * 10 ** (digits + 2) + 1e-6) / 10**digits
+    scaled = share * 10 ** (digits + 2)
+    scaled = (ceil(scaled - 1e-6) if up else floor(scaled + 1e-6)) / 10**digits
     return f"{_trim(f'{scaled:.{digits}f}')}{SPACE}%"
 
 

@@ -44,6 +44,7 @@ def test_a_long_burn_of_several_segments_flies_as_in_an_independent_program():
     assert len(program_for(sequence(2, 28.5, thrust=5000.0)).burns[0].segments) > 3
 
 
+@pytest.mark.slow
 def test_a_case_has_the_same_bits_whatever_the_width():
     inputs = {name: np.array([value, 0.5 * value]) for name, value in ERRORS.items() if not name.endswith("factor")}
     for guidance in ("open_loop", "re_aimed"):

@@ -169,6 +169,7 @@ def test_navigation_of_a_decimetre_holds_the_sources_band_if_the_gain_is_right()
     assert held(fly_cases(**INSPECTION | GOOD_FIXES, chi1=np.full(400, 0.9))).mean() >= 0.95
 
 
+@pytest.mark.slow
 def test_with_the_gain_of_the_ideal_case_one_trial_in_eight_leaves_the_sources_band():
     """The source has all of them inside; nine in ten were hoped for.  The procedure with chi1 = 0.85 leaves a relative
     ellipse of half the band already without errors, and goes 4.7 m near the limit; drift errors of 3 m in a revolution

@@ -10,7 +10,11 @@ LIFTS = np.linspace(-1.0, 2.0, 5)
 
 
 @pytest.fixture(
-    scope="module", params=["FixedStep(0.1, 20.0, control_every=5)", "AdaptiveStep(20.0, control_period=0.5)"]
+    scope="module",
+    params=[
+        "FixedStep(0.1, 20.0, control_every=5)",
+        pytest.param("AdaptiveStep(20.0, control_period=0.5)", marks=pytest.mark.slow),
+    ],
 )
 def model(request, tmp_path_factory):
     """The stone of plain numbers with each kind of clock."""

@@ -72,7 +72,9 @@ LAID_OUT = {
 }
 
 
-@pytest.mark.parametrize("layout", LAID_OUT)
+@pytest.mark.parametrize(
+    "layout", ["package", *(pytest.param(other, marks=pytest.mark.slow) for other in ("beside", "folder"))]
+)
 def test_physics_in_other_files_flies_again_in_another_process_and_follows_their_edits(layout, tmp_path):
     files, imports = LAID_OUT[layout]
     folder = campaign_in(tmp_path / "mine", files, imports)

@@ -78,6 +78,13 @@ def test_a_share_is_never_rounded_up(share, text):
     assert percent(share) == f"{text}\u202f%"
 
 
+@pytest.mark.parametrize(
+    ("share", "text"), [(0.9973, "99.73"), (1.0, "100"), (0.0, "0"), (0.001351, "0.14"), (1e-9, "0.01")]
+)
+def test_an_upper_bound_is_never_rounded_down(share, text):
+    assert percent(share, up=True) == f"{text}\u202f%"
+
+
 def test_a_count_is_grouped_in_threes():
     assert count(1234567) == "1\u202f234\u202f567"
 
