@@ -204,14 +204,18 @@ def _metrics_of(
     store: Store, part: Part, columns: Sequence[Column], metrics: Sequence[str]
 ) -> "tuple[pa.Table, dict[str, np.ndarray]]":
     import numpy as np
-    import pyarrow.compute as pc
+
+    from mc_engine.store.parts import numbers_in
 
     all_ok = part.status == {STATUS_NAME[OK]: part.rows}  # by the receipt, so that the status need not be read
     table = read_part(store.path, part, [column for column in columns if not all_ok or column.name != "status"])
-    numbers = {name: table[name].to_numpy().astype(np.float64, copy=False) for name in metrics}
+    numbers = {name: numbers_in(table[name]).astype(np.float64, copy=False) for name in metrics}
     if all_ok:
         return table, numbers
-    ok = pc.equal(table["status"], STATUS_NAME[OK]).to_numpy()
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    ok = numbers_in(pc.equal(table["status"], STATUS_NAME[OK]).cast(pa.uint8())).astype(bool)
     return table, {name: np.where(ok, values, np.nan) for name, values in numbers.items()}
 
 

@@ -8,6 +8,7 @@ with them; every page has a checksum.  The SHA-256 of a part is verified before 
 import json
 import re
 import uuid
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -26,11 +27,13 @@ from mc_engine.status import STATUS_NAME
 from mc_engine.store.run_files import NOMINAL, NOMINAL_CASE
 
 MOST_CELLS = 2**30  # of a Parquet file that is read at once
+MOST_LETTERS = 2**31 - 1  # bytes of the words of a column that Arrow counts
 PART_FOLDERS = ("cases", "history")  # of a run directory
 _SEE = "; `mc-engine verify"
 _CASE_PART = re.compile(r"cases/part-([0-9]{10,18})-([0-9]{10,18})(?:\.r[1-9][0-9]{0,8})?\.parquet")
 _HISTORY_PART = re.compile(r"history/part-[0-9]{5,9}\.parquet")
 ARROW_TYPES = {"number": pa.float64(), "integer": pa.int64(), "word": pa.string(), "switch": pa.bool_()}
+_PLAIN = {"number": np.dtype(np.float64), "integer": np.dtype(np.int64)}
 
 
 @dataclass(frozen=True)
@@ -125,17 +128,42 @@ def arrow_table(columns: Sequence[Column], arrays: Mapping[str, Any], n_rows: in
 
 
 def _arrow_array(column: Column, values: np.ndarray) -> pa.Array:
+    """The array of a column.  What a run holds as a rule is handed over as it lies in memory: `pa.array` and
+    `pa.scalar` import pandas, which takes longer than many a chunk."""
     if column.name == "status" and values.dtype.kind in "iu":
         codes, positions = np.unique(values, return_inverse=True)
-        words = pa.array([STATUS_NAME[int(code)] for code in codes], pa.string())
-        return words.take(pa.array(positions))
+        return _word_array([STATUS_NAME[int(code)] for code in codes], positions)
     if column.kind == "word":
-        if values.size and isinstance(values[0], str) and (values == values[0]).all():  # as a rule; half the time
-            return pa.repeat(pa.scalar(str(values[0])), values.size)
+        words = values.tolist()
+        if all(isinstance(word, str) for word in words):
+            distinct = {word: place for place, word in enumerate(dict.fromkeys(words))}
+            return _word_array(list(distinct), np.array([distinct[word] for word in words], dtype=np.int64))
         return pa.array(values.astype(object), pa.string(), from_pandas=True).fill_null("")  # NaN of a lost case, too
     if column.kind == "number":
-        return pa.array(values.astype(np.float64, copy=False))  # NaN stays NaN and does not become null
-    return pa.array(values, ARROW_TYPES[column.kind])
+        values = values.astype(np.float64, copy=False)  # NaN stays NaN and does not become null
+    kind = ARROW_TYPES[column.kind]
+    if column.kind in _PLAIN and values.dtype == _PLAIN[column.kind]:
+        return pa.Array.from_buffers(
+            kind, values.size, [None, pa.py_buffer(np.ascontiguousarray(values))], null_count=0
+        )
+    return pa.array(values, kind)
+
+
+def _word_array(words: Sequence[str], positions: np.ndarray) -> pa.Array:
+    """The words at these positions."""
+    texts = [word.encode() for word in words]
+    ends = np.append(0, np.array([len(text) for text in texts], dtype=np.int64)[positions].cumsum())
+    if ends[-1] > MOST_LETTERS:
+        raise ValueError(f"its words have more than {MOST_LETTERS:,} bytes")
+    data = texts[0] * positions.size if len(texts) == 1 else b"".join(texts[place] for place in positions.tolist())
+    buffers = [None, pa.py_buffer(ends.astype(np.int32)), pa.py_buffer(data)]
+    return pa.Array.from_buffers(pa.string(), positions.size, buffers, null_count=0)
+
+
+def numbers_in(column: pa.ChunkedArray) -> np.ndarray:
+    """The numbers of a column that has one in every row, as they are; unlike `to_numpy` it does not import pandas."""
+    chunks = [np.from_dlpack(chunk) for chunk in column.chunks]
+    return chunks[0] if len(chunks) == 1 else np.concatenate(chunks)
 
 
 def parquet_bytes(table: pa.Table) -> bytes:
@@ -193,11 +221,21 @@ def write_aside(
     table = _part_table(run, columns, first, count, arrays)
     content = parquet_bytes(table)
     file = file or (NOMINAL if first == NOMINAL_CASE else f"cases/{part_name(first, count)}")
-    counts = [] if first == NOMINAL_CASE else table.column("status").value_counts().to_pylist()
-    digest, status = sha256(content).hexdigest(), dict(sorted((row["values"], row["counts"]) for row in counts))
+    digest = sha256(content).hexdigest()
+    status = {} if first == NOMINAL_CASE else _status_counts(np.asarray(arrays["status"]))
     temporary = temporary_name(f"{file}.{uuid.uuid4().hex[:8]}.{digest[:32]}")
     write_synced(run, temporary, content, file)
     return Written(Part(file, first, count, len(content), digest, status), temporary)
+
+
+def _status_counts(statuses: np.ndarray) -> dict[str, int]:
+    """Status -> how many rows have it, in the order of the alphabet.  statuses : words, or their numbers."""
+    if statuses.dtype.kind in "iu":
+        codes, counts = np.unique(statuses, return_counts=True)
+        return dict(
+            sorted((STATUS_NAME[code], count) for code, count in zip(codes.tolist(), counts.tolist(), strict=True))
+        )
+    return dict(sorted(Counter(statuses.tolist()).items()))
 
 
 def _part_table(run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any]) -> pa.Table:

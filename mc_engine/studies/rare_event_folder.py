@@ -8,12 +8,13 @@ The journal holds the checksums of the other files; see `store.result_folder`.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from mc_engine.store.result_folder import read_result
 from mc_engine.store.run_files import RARE_EVENT
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 METHOD_WORDS = {
     "subset": "subset simulation",
@@ -28,7 +29,7 @@ class RareEventRecord:
 
     path: Path
     record: dict[str, Any]
-    cases: pd.DataFrame
+    cases: "pd.DataFrame"
 
     @property
     def result(self) -> dict[str, Any]:

@@ -8,13 +8,15 @@ All files are replaced together after each generation, so that a killed search l
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from mc_engine.store.result_folder import read_result
 from mc_engine.store.run_files import TUNING
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 UNFINISHED = "not ended"  # instead of why the search ended
 
@@ -36,9 +38,9 @@ class TuningRecord:
 
     path: Path
     manifest: dict[str, Any]
-    evaluations: pd.DataFrame
-    generations: pd.DataFrame
-    front: pd.DataFrame
+    evaluations: "pd.DataFrame"
+    generations: "pd.DataFrame"
+    front: "pd.DataFrame"
 
     @property
     def feasible(self) -> bool:
@@ -120,13 +122,13 @@ def infeasibility(record: TuningRecord) -> str:
     return f"{tried}; the least violation found is {float(row['violation']):.4g}: {', '.join(broken)}"
 
 
-def _commonest(evaluations: pd.DataFrame) -> str:
+def _commonest(evaluations: "pd.DataFrame") -> str:
     """The end that most of the candidates' failed cases came to, as an end of a sentence."""
     ends = evaluations["commonest_failure"][evaluations["failed_cases"] > 0].value_counts(sort=False)
     return f", most often ({ends.max():,} candidates) {ends.idxmax()}" if len(ends) else ""
 
 
-def least_violating(record: TuningRecord) -> pd.Series | None:
+def least_violating(record: TuningRecord) -> "pd.Series | None":
     """The candidate nearest to the limits; None if none has a number for every metric."""
     violation = record.evaluations["violation"]
     return record.evaluations.loc[violation.idxmin()] if np.isfinite(violation.min()) else None

@@ -37,3 +37,11 @@ def test_check_and_status_load_neither_numba_nor_matplotlib(here):
     small_store(here / "flown")
     for arguments in (["check", "--no-model", here / "cart"], ["check", "minimal"], ["status", here / "flown"]):
         assert not SLOW & loaded_by(*arguments)
+
+
+def test_a_run_and_its_status_load_no_pandas(here):
+    for arguments in (
+        ["run", "minimal", "--cases", 8, "--no-report", "--out", here / "flown"],
+        ["status", here / "flown"],
+    ):
+        assert "pandas" not in loaded_by(*arguments)
