@@ -134,6 +134,8 @@ def _arrow_array(column: Column, values: np.ndarray) -> pa.Array:
         codes, positions = np.unique(values, return_inverse=True)
         return _word_array([STATUS_NAME[int(code)] for code in codes], positions)
     if column.kind == "word":
+        if values.size and isinstance(values[0], str) and (values == values[0]).all():  # as a rule; far faster
+            return _word_array([str(values[0])], np.zeros(values.size, dtype=np.int64))
         words = values.tolist()
         if all(isinstance(word, str) for word in words):
             distinct = {word: place for place, word in enumerate(dict.fromkeys(words))}
