@@ -9,7 +9,7 @@ from mc_engine.errors import StoreError
 from mc_engine.section import ReportSection
 from mc_engine.shell_words import shell_word
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
-from mc_engine.store.parts import CASE_COLUMNS, Column, Part, read_part
+from mc_engine.store.parts import CASE_COLUMNS, Column, Part, numbers_in, read_part, rows_with
 from mc_engine.store.store import Store
 
 if TYPE_CHECKING:
@@ -33,8 +33,8 @@ def first_not_finite(store: Store) -> int | None:
     for part in store.parts:
         if part.status.get(STATUS_NAME[NOT_FINITE]):
             table = read_part(store.path, part, CASE_COLUMNS[:2])
-            lost = table["status"].to_numpy(zero_copy_only=False) == STATUS_NAME[NOT_FINITE]
-            return int(table["case_id"].to_numpy()[lost][0])
+            lost = rows_with(table["status"], STATUS_NAME[NOT_FINITE])
+            return int(numbers_in(table["case_id"])[lost][0])
     return None
 
 
@@ -205,17 +205,12 @@ def _metrics_of(
 ) -> "tuple[pa.Table, dict[str, np.ndarray]]":
     import numpy as np
 
-    from mc_engine.store.parts import numbers_in
-
     all_ok = part.status == {STATUS_NAME[OK]: part.rows}  # by the receipt, so that the status need not be read
     table = read_part(store.path, part, [column for column in columns if not all_ok or column.name != "status"])
     numbers = {name: numbers_in(table[name]).astype(np.float64, copy=False) for name in metrics}
     if all_ok:
         return table, numbers
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    ok = numbers_in(pc.equal(table["status"], STATUS_NAME[OK]).cast(pa.uint8())).astype(bool)
+    ok = rows_with(table["status"], STATUS_NAME[OK])
     return table, {name: np.where(ok, values, np.nan) for name, values in numbers.items()}
 
 

@@ -198,7 +198,7 @@ def _region_table(flown: Flown, landing: Landing) -> Table:
         f"{percent(flown.stated.confidence)} Clopper–Pearson interval; where that excludes the stated content, the "
         "distribution is not normal. Lengths are geodesics through the mean impact point, the farthest case "
         f"{number(regions.reach / 1000.0, 3)} km from it; across them the plane stretches by at most "
-        f"{percent(max(regions.plane.stretch(regions.reach), LEAST_STRETCH), 3)}."
+        f"{percent(max(regions.plane.stretch(regions.reach), LEAST_STRETCH), 3, up=True)}."
     )
     return Table(
         f"Regions of the {count(landing.rows.size)} of {count(flown.n_held)} cases that came down", columns, rows, note

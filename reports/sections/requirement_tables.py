@@ -169,7 +169,7 @@ def _risk_row(verdict: Verdict, among: int) -> tuple[Cell, ...]:
         Cell("too few cases", -1.0) if verdict.accepted is None else Cell(count(verdict.accepted), verdict.accepted)
     )
     if verdict.looked:
-        consumer = Cell(f"below {percent(1.0 - verdict.confidence)}", 1.0 - verdict.confidence)
+        consumer = Cell(f"below {percent(1.0 - verdict.confidence, up=True)}", 1.0 - verdict.confidence)
     else:
         consumer = Cell(percent(verdict.consumer_risk, up=True), verdict.consumer_risk)
     shared = f"with {percent(1.0 - (1.0 - verdict.confidence) / among)} each"

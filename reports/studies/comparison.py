@@ -120,7 +120,9 @@ def build_comparison(comparison: Comparison, runs: tuple[Run, Run] | None = None
 
 
 def _change_sentence(comparison: Comparison) -> str:
-    chance = f"{count(comparison.n_tests)} tests; at most {percent(comparison.alpha)} chance of any false alarm"
+    chance = (
+        f"{count(comparison.n_tests)} tests; at most {percent(comparison.alpha, up=True)} chance of any false alarm"
+    )
     what = (
         "Significant changes from run A to run B" if comparison.changed else "No significant change from run A to run B"
     )

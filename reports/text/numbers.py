@@ -131,7 +131,8 @@ def percent(share: float | None, digits: int = 2, up: bool = False) -> str:
     """
     if share is None:
         return "–"
-    while 0.0 < 1.0 - share < 0.5 * 10.0 ** -(digits + 2) and digits < 8:
+    unit = 1.0 if up else 0.5  # of the last digit, within which 100 % would be printed
+    while 0.0 < 1.0 - share < unit * 10.0 ** -(digits + 2) and digits < 8:
         digits += 1
     scaled = share * 10 ** (digits + 2)
     scaled = (ceil(scaled - 1e-6) if up else floor(scaled + 1e-6)) / 10**digits

@@ -154,7 +154,6 @@ def test_the_pods_of_the_indexed_job_fly_their_pieces_and_the_second_job_merges_
     check_merged(fetch(f"{url}/merged", tmp_path / "merged"), source, tmp_path)
 
 
-@pytest.mark.slow
 def test_an_index_whose_piece_is_whole_changes_nothing_when_it_is_begun_again(tmp_path, store):
     source = campaign_folder(tmp_path / "stones", CASES)
     told = {"STORE": f"{store}/again", "PIECES": str(PIECES), "CAMPAIGN": str(source), "WORKERS": "1"}

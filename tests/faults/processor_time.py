@@ -9,11 +9,13 @@ def seconds(call, enough):
     """The least of three times [s], or the first below `enough`: other work on the machine makes a time long."""
     least = math.inf
     gc.freeze()  # what other tests have left in this process is not searched for waste on the clock
-    for _ in range(3):
-        begin = time.thread_time()
-        call()
-        least = min(least, time.thread_time() - begin)
-        if least < enough:
-            break
-    gc.unfreeze()
+    try:
+        for _ in range(3):
+            begin = time.thread_time()
+            call()
+            least = min(least, time.thread_time() - begin)
+            if least < enough:
+                break
+    finally:
+        gc.unfreeze()
     return least

@@ -201,7 +201,7 @@ def test_a_history_that_cannot_be_read_is_no_result(tmp_path, options):
     history = f"[{tables}][int(np.ravel(case.id)[0])]()"
     fault = f"return {{'fall_time_s': {one}, 'impact_speed_m_s': {one}}}, {history}"
     file = python_campaign(tmp_path / "ball", cases=len(HISTORIES), fault=fault, options=options)
-    rows = run(load_campaign(file), tmp_path / "run", workers=1, chunk=1).cases()
+    rows = run(load_campaign(file), tmp_path / "run", workers=1).cases()
     assert set(rows["status"]) == {"no-result"}
     for said, (_, reason) in zip(rows["reason"], HISTORIES.values(), strict=True):
         assert reason in said

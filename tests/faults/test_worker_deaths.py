@@ -199,7 +199,7 @@ def test_a_case_that_takes_too_long_and_one_that_eats_its_memory_are_given_up(tm
     ("backend", "trap", "seconds", "end"),
     [
         ("loky", 1, None, ["worker-died", "the process flying this case died"]),
-        pytest.param("loky", 2, 3.0, ["time-limit", "took longer than 3 s"], marks=pytest.mark.slow),
+        ("loky", 2, 3.0, ["time-limit", "took longer than 3 s"]),
         pytest.param("dask", 2, 3.0, ["time-limit", "took longer than 3 s"], marks=pytest.mark.slow),
     ],
 )

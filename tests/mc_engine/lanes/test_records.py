@@ -82,11 +82,7 @@ def test_records_of_two_classes_are_no_choice(other):
 
 
 @pytest.fixture(
-    scope="module",
-    params=[
-        pytest.param("FixedStep(0.1, 2.0, control_every=5)", marks=pytest.mark.slow),
-        "AdaptiveStep(2.0, control_period=0.5)",
-    ],
+    scope="module", params=["FixedStep(0.1, 2.0, control_every=5)", "AdaptiveStep(2.0, control_period=0.5)"]
 )
 def text(request):
     """The model with each kind of clock."""

@@ -261,9 +261,12 @@ FLAT = (
 )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    "clock", ["FixedStep(step=10.0, until=10_000.0)", "AdaptiveStep(10_000.0, control_period=10.0)"]
+    "clock",
+    [
+        "FixedStep(step=10.0, until=10_000.0)",
+        pytest.param("AdaptiveStep(10_000.0, control_period=10.0)", marks=pytest.mark.slow),
+    ],
 )
 def test_a_discrete_state_of_records_flies_as_one_of_numbers_at_every_width_and_interpreted(clock, tmp_path):
     clocked = (("FixedStep(step=10.0, until=10_000.0)", clock), ("import Event", "import AdaptiveStep, Event"))

@@ -1,6 +1,5 @@
 """What is said of mistakes in phases, delayed events and metrics at events, and that `check` knows all phases."""
 
-import pytest
 from mistaken_campaign import campaign_with, refused
 
 from mc_engine.flight.contract import breaches
@@ -80,7 +79,6 @@ NEVER = ('Phase(rhs, events={"apogee"', 'Phase(rhs, events={"never": Event(beyon
 BEYOND = ("@physics\ndef observe", "@physics\ndef beyond(s):\n    return s.x - 1e9\n\n\n@physics\ndef observe")
 
 
-@pytest.mark.slow
 def test_an_event_of_the_second_phase_that_never_comes_is_found_by_flying(tmp_path):
     (found,) = faults(campaign_with(tmp_path / "event", *PHASES, NEVER, BEYOND))
     assert 'the event "never" happens in none of 32 cases, in the phases that look for it' in found

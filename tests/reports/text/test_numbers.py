@@ -79,7 +79,8 @@ def test_a_share_is_never_rounded_up(share, text):
 
 
 @pytest.mark.parametrize(
-    ("share", "text"), [(0.9973, "99.73"), (1.0, "100"), (0.0, "0"), (0.001351, "0.14"), (1e-9, "0.01")]
+    ("share", "text"),
+    [(0.9973, "99.73"), (1.0, "100"), (0.0, "0"), (0.001351, "0.14"), (1e-9, "0.01"), (0.99994, "99.994")],
 )
 def test_an_upper_bound_is_never_rounded_down(share, text):
     assert percent(share, up=True) == f"{text}\u202f%"
