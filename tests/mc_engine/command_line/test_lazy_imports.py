@@ -39,9 +39,7 @@ def test_check_and_status_load_neither_numba_nor_matplotlib(here):
         assert not SLOW & loaded_by(*arguments)
 
 
-def test_a_run_and_its_status_load_no_pandas(here):
-    for arguments in (
-        ["run", "minimal", "--cases", 8, "--no-report", "--out", here / "flown"],
-        ["status", here / "flown"],
-    ):
+def test_a_run_its_status_and_its_summary_load_no_pandas(here):
+    run = here / "flown"
+    for arguments in (["run", "minimal", "--cases", 8, "--no-report", "--out", run], ["status", run], ["summary", run]):
         assert "pandas" not in loaded_by(*arguments)
