@@ -27,7 +27,7 @@ from mc_engine.status import STATUS_NAME
 from mc_engine.store.run_files import NOMINAL, NOMINAL_CASE
 
 MOST_CELLS = 2**30  # of a Parquet file that is read at once
-MOST_LETTERS = 2**31 - 1  # bytes of the words of a column that Arrow counts
+_MOST_BYTES = 2**31 - 1  # of the words of a column, which Arrow counts in int32
 PART_FOLDERS = ("cases", "history")  # of a run directory
 _SEE = "; `mc-engine verify"
 _CASE_PART = re.compile(r"cases/part-([0-9]{10,18})-([0-9]{10,18})(?:\.r[1-9][0-9]{0,8})?\.parquet")
@@ -154,8 +154,8 @@ def _word_array(words: Sequence[str], positions: np.ndarray) -> pa.Array:
     """The words at these positions."""
     texts = [word.encode() for word in words]
     ends = np.append(0, np.array([len(text) for text in texts], dtype=np.int64)[positions].cumsum())
-    if ends[-1] > MOST_LETTERS:
-        raise ValueError(f"its words have more than {MOST_LETTERS:,} bytes")
+    if ends[-1] > _MOST_BYTES:
+        raise ValueError(f"its words have more than {_MOST_BYTES:,} bytes")
     data = texts[0] * positions.size if len(texts) == 1 else b"".join(texts[place] for place in positions.tolist())
     buffers = [None, pa.py_buffer(ends.astype(np.int32)), pa.py_buffer(data)]
     return pa.Array.from_buffers(pa.string(), positions.size, buffers, null_count=0)

@@ -94,7 +94,7 @@ def test_one_signal_ends_a_run_that_has_no_worker(tmp_path):
         process = waiting(tmp_path, cluster.scheduler_address)
         time.sleep(3.0)  # its task lies with the scheduler
         process.send_signal(signal.SIGTERM)
-        errors = ended(process, DRAIN_S + 60.0)
+        errors = ended(process, DRAIN_S + 20.0)
     again = f"`mc-engine resume {tmp_path / 'run'} --backend dask --scheduler {cluster.scheduler_address}`"
     assert f"interrupted with 0 of 400 cases; {again} flies the rest" in errors
     assert runner.resume(tmp_path / "run").status_counts() == {"ok": CASES}
@@ -110,7 +110,7 @@ def test_signals_end_a_run_on_our_own_cluster_while_its_workers_die(tmp_path):
         assert process.poll() is None, process.communicate()[1]
         time.sleep(0.02)
     process.send_signal(signal.SIGTERM)
-    assert "flies the rest" in ended(process, DRAIN_S + 60.0)
+    assert "flies the rest" in ended(process, DRAIN_S + 30.0)
 
 
 @pytest.mark.slow

@@ -68,7 +68,7 @@ def one_of_each(faults):
     return dict(zip(faults, np.random.default_rng(21).permutation(SAMPLE[1]).tolist(), strict=False))
 
 
-def refuse_others_than(table, faults, cases):
+def check_blame(table, faults, cases):
     """Every fault costs its own case, with its own status and reason, and no other one."""
     for name, case in cases.items():
         (row,) = table[table["case_id"] == case].to_dict("records")
@@ -107,7 +107,7 @@ def test_every_fault_of_a_function_costs_its_case(tmp_path, sound):
     fault = "\n".join(at((case,), PYTHON_FAULTS[name][0]) for name, case in cases.items())
     file = python_campaign(tmp_path / "ball", cases=SAMPLE[1], fault=fault, options=LIMITS)
     table = run(load_campaign(file), tmp_path / "run", workers=2).cases()
-    refuse_others_than(table, PYTHON_FAULTS, cases)
+    check_blame(table, PYTHON_FAULTS, cases)
     well = (table["status"] == "ok").to_numpy()
     assert table[well].equals(sound[: SAMPLE[1]][well])
     assert len(list((tmp_path / "run/simulator").iterdir())) == len(cases)
@@ -130,7 +130,7 @@ def test_every_fault_of_a_program_costs_its_case(tmp_path, sound):
     fault = " ".join(in_c((case,), C_FAULTS[name][0]) for name, case in cases.items())
     file = program_campaign(tmp_path / "ball", cases=SAMPLE[1], fault=fault)
     table = run(load_campaign(file), tmp_path / "run", workers=2).cases()
-    refuse_others_than(table, C_FAULTS, cases)
+    check_blame(table, C_FAULTS, cases)
     well = (table["status"] == "ok").to_numpy()
     assert np.allclose(table[METRICS][well], sound[METRICS][: SAMPLE[1]][well], rtol=1e-12, atol=0.0)
     assert running(str(tmp_path / "ball")) == []
