@@ -7,7 +7,8 @@ prcc         partial rank correlation: the monotonic trend with the (linear) eff
 first_order  Var(E[metric | input]) / Var(metric): the share of the variance that goes when the input becomes known,
              of any shape; what is missing to 1 in the sum over independent inputs is due to interactions
 total        E[Var(metric | all other inputs)] / Var(metric): what the input does alone and together with others, from
-             a surrogate (`total_order`); NaN where inputs are correlated, for which it has no such meaning
+             a surrogate (`total_order`) of 200 cases at least; NaN where inputs are correlated, for which it has no
+             such meaning
 
 For inputs that are correlated with each other src and prcc tell them apart as far as the cases do, while spearman and
 first_order also hold what an input owes to its partners.  first_order and total have standard errors, for independent
@@ -26,6 +27,7 @@ import numpy as np
 from mc_engine.statistics.first_order import first_order, standardised
 from mc_engine.statistics.input_columns import InputColumn, average_ranks, finite_rows, input_columns
 from mc_engine.statistics.moments import near_one
+from mc_engine.statistics.total_order import FEWEST_CASES as FEWEST_OF_TOTALS
 from mc_engine.statistics.total_order import total_order
 
 FEWEST_CASES = 20
@@ -118,7 +120,7 @@ def _fill(
     varying, where = table[:, moving], where[moving]
     for k in live:
         indices["first_order"][k, where], indices["first_order_error"][k, where] = first_order(columns[k], varying)
-    if independent:
+    if independent and n >= FEWEST_OF_TOTALS:
         alive = np.ix_(np.array(live), where)
         indices["total"][alive], indices["total_error"][alive], indices["unexplained"][where] = total_order(
             [columns[k] for k in live], varying

@@ -7,6 +7,7 @@ The journal holds the checksums of the other files; see `store.result_folder`.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,13 +64,21 @@ def requirement_words(result: dict[str, Any]) -> str:
 def probability_words(result: dict[str, Any]) -> str:
     """The estimate, its interval, and what the requirement allows."""
     allowed = 1.0 - result["requirement"]["share"]
+    lower, upper = printed_interval(result)
     if not result["probability"]:
-        return f"below {result['upper']:.2g}; no case failed (the requirement allows {allowed:.3g})"
-    interval = f"{100.0 * result['confidence']:.6g} % interval {result['lower']:.3g} to {result['upper']:.3g}"
+        return f"below {upper:.3g}; no case failed (the requirement allows {allowed:.3g})"
+    interval = f"{100.0 * result['confidence']:.6g} % interval {lower:.3g} to {upper:.3g}"
     return (
         f"{result['probability']:.3g} of not meeting it, {interval}, by {METHOD_WORDS[result['method']]}; the "
         f"requirement allows {allowed:.3g}, so it is {standing(result)}"
     )
+
+
+def printed_interval(result: dict[str, Any], digits: int = 3) -> tuple[float, float]:
+    """Its ends in so many significant digits, each rounded outward: what is printed holds what was found."""
+    ends = zip((result["lower"], result["upper"]), (ROUND_FLOOR, ROUND_CEILING), strict=True)
+    lower, upper = (float(Context(digits, rounding).plus(Decimal(repr(float(end))))) for end, rounding in ends)
+    return lower, upper
 
 
 def standing(result: dict[str, Any]) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, beyond_chance
+from mc_engine.statistics.sensitivity import FEWEST_CASES, FEWEST_OF_TOTALS, Sensitivity, beyond_chance
 from reports.contributors.tornado_figure import STRONGEST, contributor_figure, name_of, strongest
 from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.run.chosen_units import spread_text
@@ -43,7 +43,9 @@ def _effect_figure(flown: Flown, contributions: Contributions, shown: list[str])
     few, most = min(used), max(used)
     of = f"{count(few)}{f' to {count(most)}' * (few != most)} of {count(contributions.n_tried)}"
     of_blocks = f"{of} blocks of cases flown for this purpose"
-    source = f"from {of_blocks}" if contributions.trends is None else f"from a surrogate model of {of} cases"
+    fitted = any(row.total is not None for row in contributions.rows())
+    of_cases = f"from a surrogate model of {of} cases" if fitted else f"from {of} cases"
+    source = f"from {of_blocks}" if contributions.trends is None else of_cases
     return contributor_figure(flown, [(flown.words(item), contributions.by_metric[item]) for item in shown], source)
 
 
@@ -146,8 +148,9 @@ def _note(flown: Flown, contributions: Contributions, shown: list[str]) -> str:
         ) + (reduction if contributions.held else "")
     unexplained = (
         "Unexplained: fraction that the surrogate model behind the total effects attributes to no input (random "
-        "draws, discontinuities); a total effect may be larger by up to it. With a section [sensitivity] in the "
-        "campaign file, flights of their own compute what the random draws contribute. "
+        "draws, discontinuities); a total effect may be larger by up to it, which the upper end of its interval "
+        "includes. With a section [sensitivity] in the campaign file, flights of their own compute what the random "
+        "draws contribute. "
     ) * any(row.input == UNEXPLAINED for row in rows)
     note = (
         f"Estimated from the table of cases. {unexplained}{each} SRC, PRCC and Spearman: trends with their direction. "
@@ -162,6 +165,8 @@ def _note(flown: Flown, contributions: Contributions, shown: list[str]) -> str:
             "input owes to its correlation, so that they overlap and do not add up to σ; total effects require "
             "independent inputs and are left out."
         )
+    elif rows and all(row.total is None for row in rows):
+        note += f" Total effects need {FEWEST_OF_TOTALS} cases, or a section [sensitivity] in the campaign file."
     return note
 
 

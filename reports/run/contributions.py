@@ -146,20 +146,31 @@ def _of_table(flown: "Flown", metrics: list[str]) -> Contributions | None:
     shares = ((indices.first_order, indices.first_order_error), (indices.total, indices.total_error))
     by_metric = {}
     for k, metric in enumerate(metrics):
-        ranked = _ranked(flown, metric, indices.inputs, *((share[:, k], error[:, k]) for share, error in shares))
-        left = _number(indices.unexplained[k]) if ranked else None
-        rest = [] if left is None else [Contributor(metric, UNEXPLAINED, left, left, None, None)]
+        left = _number(indices.unexplained[k])
+        ranked = _ranked(
+            flown,
+            metric,
+            indices.inputs,
+            *((share[:, k], error[:, k]) for share, error in shares),
+            unassigned=left or 0.0,
+        )
+        rest = [] if left is None or not ranked else [Contributor(metric, UNEXPLAINED, left, left, None, None)]
         by_metric[metric] = (*ranked, *rest)
     used = {metric: int(n) for metric, n in zip(metrics, indices.n_used, strict=True)}
     return Contributions(by_metric, 0, used, indices.n_tried, {}, indices)
 
 
 def _ranked(
-    flown: "Flown", metric: str, names: Sequence[str], *shares: tuple[np.ndarray, np.ndarray]
+    flown: "Flown",
+    metric: str,
+    names: Sequence[str],
+    *shares: tuple[np.ndarray, np.ndarray],
+    unassigned: float = 0.0,
 ) -> tuple[Contributor, ...]:
     """The contributors of one metric that have an effect, the strongest first.
 
     shares : values and standard errors float64[n_names] of the first-order and total effects, and of the fall.
+    unassigned : what is part of the total effects of unknown inputs, by which each interval reaches further up.
     """
     # standard errors on each side of an interval
     errors = float(scipy.special.ndtri(0.5 * (1.0 + flown.stated.confidence)))
@@ -168,6 +179,7 @@ def _ranked(
         known = [(float(value[row]), errors * float(error[row])) for value, error in shares]
         if any(np.isfinite(value) for value, _ in known):
             (first, first_ends), (total, total_ends) = (_inside(*effect, 0.0, 1.0) for effect in known[:2])
+            total_ends = total_ends and (total_ends[0], min(total_ends[1] + unassigned, 1.0))
             fall, fall_ends = _inside(*known[2], -np.inf, 1.0) if known[2:] else (None, None)
             rows.append(Contributor(metric, name, first, total, first_ends, total_ends, fall, fall_ends))
     return tuple(sorted(rows, key=lambda contributor: -contributor.size))

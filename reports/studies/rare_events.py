@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.studies.rare_event_folder import RareEventRecord, accepted_percent, plain_cases
+from mc_engine.studies.rare_event_folder import RareEventRecord, accepted_percent, plain_cases, printed_interval
 from reports.document.blocks import (
     Block,
     Card,
@@ -115,7 +115,7 @@ def build_rare_event(record: RareEventRecord, name: str) -> Document:
 def _estimate_sentence(result: dict[str, Any]) -> str:
     event = f"P({_event(result)})"
     if not result["probability"]:
-        return f"No case failed: {event} < {number(result['upper'], 3)}. Requirement {_judged(result)[0]}."
+        return f"No case failed: {event} < {number(printed_interval(result)[1], 3)}. Requirement {_judged(result)[0]}."
     return f"{event} = {number(result['probability'], 3)} ({_interval(result)}). Requirement {_judged(result)[0]}."
 
 
@@ -128,8 +128,8 @@ def _event(result: dict[str, Any]) -> str:
 
 
 def _interval(result: dict[str, Any]) -> str:
-    ends = f"{number(result['lower'], 3)} to {number(result['upper'], 3)}"
-    return f"{percent(result['confidence'])} confidence interval {ends}"
+    lower, upper = printed_interval(result)
+    return f"{percent(result['confidence'])} confidence interval {number(lower, 3)} to {number(upper, 3)}"
 
 
 def _judged(result: dict[str, Any]) -> tuple[str, str]:
@@ -158,7 +158,7 @@ def _verdict_card(result: dict[str, Any]) -> Card:
     answer, tone = _judged(result)
     found = f"Probability of failure {number(result['probability'], 3)}, {_interval(result)}"
     if not result["probability"]:
-        found = f"No case failed: probability of failure below {number(result['upper'], 3)}"
+        found = f"No case failed: probability of failure below {number(printed_interval(result)[1], 3)}"
     return Card(result["requirement"]["name"], answer, f"{found}; allowed: {number(allowed, 3)}.{source}", tone)
 
 
@@ -273,7 +273,7 @@ def _probability_figure(result: dict[str, Any], shown: list[dict[str, Any]]) -> 
     x = Axis(axis_label("margin", result["metric"]["unit"]), reach=Axis().ends([margin, np.zeros(1)])[::-1])
     words = (
         f"The probability falls over {margin.size} levels as the margin falls to zero, where it is "
-        f"{number(p[0], 4)}, interval {number(lower[0], 4)} to {number(upper[0], 4)}"
+        f"{number(result['probability'], 3)} ({_interval(result)})"
     )
     plot = Plot(marks, x, Axis("P(smaller margin)", log=True), height=340.0)
     return Drawing("Probability over the margin", (plot,), words=words)

@@ -67,6 +67,24 @@ def test_the_standard_errors_are_the_scatter_over_many_samples():
         assert ((told > 0.7 * scatter) & (told < 1.6 * scatter)).all(), (told, scatter)
 
 
+def test_intervals_of_the_fewest_cases_hold_what_they_say_and_fewer_have_none():
+    """90 % intervals, with what is unexplained above; sums of normal inputs and of a square, of 60 samples each."""
+    shares = {"sum": np.array([9.0, 4.0, 1.0]) / 14.0, "square": np.array([2.0, 1.0, 0.0]) / 3.0}
+    held = {name: np.zeros(3) for name in shares}
+    for seed in range(60):
+        x = dict(zip("abc", np.random.Generator(np.random.Philox(seed)).normal(size=(3, 200)), strict=True))
+        y = {"sum": 3.0 * x["a"] + 2.0 * x["b"] + x["c"], "square": x["a"] ** 2 + x["b"]}
+        found = sensitivity(x, y)
+        reach = 1.645 * found.total_error
+        inside = [np.column_stack([*shares.values()]) >= found.total - reach]
+        inside.append(np.column_stack([*shares.values()]) <= found.total + reach + found.unexplained)
+        for k, name in enumerate(y):
+            held[name] += np.all(inside, axis=0)[:, k]
+    assert all((number >= 0.75 * 60).all() for number in held.values()), held
+    fewer = sensitivity({name: values[:199] for name, values in x.items()}, {"y": y["sum"][:199]})
+    assert np.isnan([fewer.total, fewer.total_error]).all() and np.isfinite(fewer.first_order).all()
+
+
 def test_correlated_inputs_have_no_total_index():
     x = draws(3)
     again = {**x, "x3": x["x0"] + 0.5 * x["x1"]}

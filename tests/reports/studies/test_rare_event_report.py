@@ -11,7 +11,7 @@ import reports
 from mc_engine.store.parts import Column
 from mc_engine.store.result_folder import write_result
 from mc_engine.store.run_files import RARE_EVENT
-from mc_engine.studies.rare_event_folder import open_rare_event, rare_event_lines
+from mc_engine.studies.rare_event_folder import open_rare_event, probability_words, rare_event_lines
 from reports.document.blocks import FigureBlock, Table, blocks_of
 from reports.drawing import screen
 from reports.studies.rare_events import build_rare_event
@@ -79,6 +79,14 @@ def test_the_verdict_is_where_the_interval_lies(tmp_path, lower, upper, answer):
     assert build_rare_event(record, "out").verdicts[0].answer == answer
 
 
+def test_the_printed_interval_holds_the_one_that_was_found(tmp_path):
+    record = estimated(tmp_path, lower=1.4996e-5, upper=2.7001e-5)
+    assert "interval 1.49·10⁻⁵ to 2.71·10⁻⁵" in build_rare_event(record, "out").subtitle
+    assert "interval 1.49e-05 to 2.71e-05" in probability_words(record.result)
+    none = {**record.result, "probability": 0.0, "lower": 0.0, "upper": 2.9956e-4}  # 1 - 0.05**(1/10000)
+    assert probability_words(none).startswith("below 0.0003;")
+
+
 def test_levels_and_failed_inputs_are_listed_and_drawn(tmp_path):
     document = build_rare_event(estimated(tmp_path), "out")
     assert [row[1] for row in table(document, "Levels")] == ["all", "1.4", "0.6", "0.2", "0.05"]
@@ -89,7 +97,7 @@ def test_levels_and_failed_inputs_are_listed_and_drawn(tmp_path):
     interval, point = screen.specifications(figure.drawing)[0]["data"][-2:]
     assert interval["y"] == [pytest.approx(1.5e-5), pytest.approx(2.7e-5), None]
     assert interval["x"][:2] == 2 * point["x"]
-    assert "interval 1.5·10⁻⁵ to 2.7·10⁻⁵" in figure.drawing.alternative
+    assert "2·10⁻⁵ (95\u202f% confidence interval 1.5·10⁻⁵ to 2.7·10⁻⁵)" in figure.drawing.alternative
 
 
 def test_without_a_failed_case_the_report_says_below(tmp_path):
