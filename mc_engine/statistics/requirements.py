@@ -24,6 +24,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from mc_engine.statistics import binomial, time_uniform, tolerance
+from mc_engine.statistics.tolerance import Judged
 
 PASS = "pass"
 FAIL = "fail"
@@ -34,6 +35,12 @@ JOINT = "all at once"
 SAMPLING_DESIGNS = ("mc", "lhs", "sobol", "halton")  # the last one of runs of older versions
 # Designs whose every case is chosen: percentiles of them would be of that choice.
 CHOSEN_DESIGNS = ("grid", "one_at_a_time")
+
+
+def judged_by(requirement: Mapping[str, Any]) -> Judged:
+    """What a requirement record is judged by; the limits are named if there are two."""
+    limits = _limit(requirement, "at_least"), _limit(requirement, "at_most")
+    return Judged(str(requirement["metric"]), *(limits if None not in limits else ()))
 
 
 class ShareLimits(Protocol):
@@ -64,7 +71,8 @@ class Verdict:
     upper : float or None, one-sided upper confidence bound
     demonstrated : float or None, the limit that the cases do demonstrate with share and confidence (tolerance limit);
         None with two limits
-    enclosed : tuple or None, the two limits that they demonstrate, for a requirement with two
+    enclosed : tuple or None, the two limits that they demonstrate, for a requirement with two: each moved inward by the
+        same distance, the margin, or outward where that is negative
     needed : int or None, cases that would demonstrate the share if no further one failed; None if it is decided
     accepted : int or None, most failures with which so many cases pass; None if they cannot
     consumer_risk : float or None, probability of passing a system that just misses the share; None where the number of
@@ -116,7 +124,7 @@ class Verdict:
     def margin(self) -> float | None:
         """Distance from the demonstrated limit to the required one, positive inside; None if there is none.
 
-        With two limits, the smaller of the two distances.
+        It is not negative exactly where the requirement passes.
         """
         low, high = self.enclosed if self.enclosed is not None else (self.demonstrated, self.demonstrated)
         above = None if self.at_most is None or high is None else self.at_most - high
@@ -183,23 +191,23 @@ def judge_all(
     ok = np.asarray(ok, dtype=bool)
     counts = LimitCounts(requirements)
     counts.add(column, ok)
-    ordered: dict[str, np.ndarray] = {}
+    ordered: dict[Judged, np.ndarray] = {}
 
-    def ranked(metric: str, rank: int) -> float:
-        if metric not in ordered:
-            values = np.asarray(column(metric), dtype=np.float64)
-            ordered[metric] = np.sort(values[ok & np.isfinite(values)])
-        return float(ordered[metric][rank - 1])
+    def ranked(judged: Judged, rank: int) -> float:
+        if judged not in ordered:
+            values = np.asarray(column(judged.metric), dtype=np.float64)
+            ordered[judged] = np.sort(judged.of(values[ok & np.isfinite(values)]))
+        return float(ordered[judged][rank - 1])
 
     return judge_counted(counts, ranked, design, looked)
 
 
 def judge_counted(
-    counts: LimitCounts, ranked: Callable[[str, int], float] | None, design: str = "mc", looked: bool = False
+    counts: LimitCounts, ranked: Callable[[Judged, int], float] | None, design: str = "mc", looked: bool = False
 ) -> tuple[list[Verdict], Verdict | None]:
     """The verdict on each requirement that was counted, and the joint one; None for a single one or none.
 
-    ranked : metric and rank to the order statistic of the usable values, from 1; None: no demonstrated bounds.
+    ranked : what is judged and rank to the order statistic of the usable values, from 1; None: no demonstrated bounds.
     looked : whether the number of cases was decided by looking at them.  There is no joint verdict either where the
     requirements together leave nothing to be asked for.  Its confidence is the smallest of theirs.
     """
@@ -266,7 +274,7 @@ def _verdict(
     requirement: Mapping[str, Any],
     counts: LimitCounts,
     which: int,
-    ranked: Callable[[str, int], float] | None,
+    ranked: Callable[[Judged, int], float] | None,
     design: str,
     looked: bool,
     among: int,
@@ -309,7 +317,7 @@ def _verdict(
     )
     if ranked is None or which < 0 or not known:
         return verdict
-    return _with_limits_shown(verdict, ranked, limits)
+    return _with_limits_shown(verdict, judged_by(requirement), ranked)
 
 
 _UNKNOWN: tuple[str, float | None, float | None] = (NOT_DEMONSTRABLE, None, None)
@@ -326,28 +334,17 @@ def _outcome(
     return (FAIL if upper < share else NOT_DEMONSTRABLE), lower, upper
 
 
-def _with_limits_shown(verdict: Verdict, ranked: Callable[[str, int], float], limits: ShareLimits) -> Verdict:
-    """The verdict with the tolerance limits that the usable values show."""
+def _with_limits_shown(verdict: Verdict, judged: Judged, ranked: Callable[[Judged, int], float]) -> Verdict:
+    """The verdict with the tolerance limit, or both, that the usable values show."""
     lost, usable = verdict.no_number, verdict.tried - verdict.no_number
-
-    def value(rank: int | None) -> float | None:
-        return None if rank is None else ranked(verdict.metric, rank)
-
-    if verdict.at_least is None:
-        return replace(verdict, demonstrated=value(tolerance.upper_rank(usable, verdict.accepted, lost)))
-    if verdict.at_most is None:
-        return replace(verdict, demonstrated=value(tolerance.lower_rank(usable, verdict.accepted, lost)))
-    if verdict.looked:
-        # Blocks of values are exchangeable at one number of cases only; at all of them each end stands for itself,
-        # with half of what may lie outside and half of the error.
-        half = limits.acceptance_number(
-            verdict.tried, binomial.half_rate_share(verdict.share), 1.0 - 0.5 * (1.0 - verdict.confidence)
-        )
-        ends = (tolerance.lower_rank(usable, half, lost), tolerance.upper_rank(usable, half, lost))
-    else:
-        ends = tolerance.enclosing_ranks(usable, verdict.accepted, lost) or (None, None)
-    low, high = value(ends[0]), value(ends[1])
-    return replace(verdict, enclosed=None if low is None or high is None else (low, high))
+    worst_is_largest = verdict.at_least is None
+    rank = (tolerance.upper_rank if worst_is_largest else tolerance.lower_rank)(usable, verdict.accepted, lost)
+    if rank is None:
+        return verdict
+    value = ranked(judged, rank)
+    if verdict.at_most is None or verdict.at_least is None:
+        return replace(verdict, demonstrated=value)
+    return replace(verdict, enclosed=(verdict.at_least + value, verdict.at_most - value))
 
 
 def was_looked_at(manifest: Mapping[str, Any], n_cases: int) -> bool:

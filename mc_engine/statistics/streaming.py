@@ -12,9 +12,10 @@ import numpy as np
 
 from mc_engine.statistics.moments import Spread, Tally, finite_values
 from mc_engine.statistics.order_statistics import QUANTILES, ranked_quantile, ranks_read
-from mc_engine.statistics.requirements import LimitCounts, Verdict, judge_counted
+from mc_engine.statistics.requirements import LimitCounts, Verdict, judge_counted, judged_by
 from mc_engine.statistics.selection import Selection
 from mc_engine.statistics.summary import Summary, summary_of, without_number
+from mc_engine.statistics.tolerance import Judged
 
 Passes = Callable[[Sequence[str]], Iterable[Mapping[str, np.ndarray]]]
 
@@ -46,42 +47,48 @@ def stream(
     """
     counts = LimitCounts(requirements)
     tallies = {name: Tally() for name in metrics}
-    digits = {name: Selection() for name in metrics}
+    digits = {column: Selection() for column in dict.fromkeys([*map(Judged, metrics), *map(judged_by, requirements)])}
     for part in passes(metrics):
         columns = {name: np.asarray(part[name], dtype=np.float64) for name in metrics}
-        for name, values in columns.items():
-            digits[name].add(tallies[name].add(values))
+        finite = {name: tallies[name].add(values) for name, values in columns.items()}
+        for column, selection in digits.items():
+            selection.add(column.of(finite[column.metric]))
         if requirements:
             first = columns[str(requirements[0]["metric"])]
             counts.add(columns.__getitem__, np.ones(first.size, dtype=bool))
     used = [name for name in metrics if tallies[name].n_used]
-    wanted = {
-        name: set().union(*(ranks_read(tallies[name].n_used, p, confidence) for p in probabilities)) for name in used
-    }
+    wanted = {column: set[int]() for column in digits if column.metric in used}
+    for name in used:
+        wanted[Judged(name)].update(*(ranks_read(tallies[name].n_used, p, confidence) for p in probabilities))
 
-    def asked(metric: str, rank: int) -> float:
-        wanted[metric].add(rank)
+    def asked(column: Judged, rank: int) -> float:
+        wanted[column].add(rank)
         return 0.0
 
     judge_counted(counts, asked, design, looked)
-    digits = {name: digits[name].next(wanted[name]) for name in used}
+    digits = {column: digits[column].next(ranks) for column, ranks in wanted.items()}
     spreads = {name: Spread(tallies[name]) for name in used}
-    unsettled, second = used, True
+    unsettled, second = [*wanted], True
     while unsettled:
-        for part in passes(unsettled):
-            for name in unsettled:
-                finite = finite_values(np.asarray(part[name], dtype=np.float64))
-                digits[name].add(finite)
-                if second:
-                    spreads[name].add(finite)
-        digits.update({name: digits[name].next() for name in unsettled})
-        unsettled, second = [name for name in unsettled if not digits[name].done], False
-    ranked = {name: selection.values for name, selection in digits.items()}
+        names = list(dict.fromkeys(column.metric for column in unsettled))
+        for part in passes(names):
+            finite = {name: finite_values(np.asarray(part[name], dtype=np.float64)) for name in names}
+            for column in unsettled:
+                digits[column].add(column.of(finite[column.metric]))
+            for name in names if second else ():
+                spreads[name].add(finite[name])
+        digits.update({column: digits[column].next() for column in unsettled})
+        unsettled, second = [column for column in unsettled if not digits[column].done], False
+    ranked = {column: selection.values for column, selection in digits.items()}
     summaries = {}
     for name, tally in tallies.items():
         if name not in spreads:
             summaries[name] = without_number(tally, confidence)
             continue
-        quantiles = (ranked_quantile(tally.n_used, ranked[name].__getitem__, p, confidence) for p in probabilities)
+        quantiles = (
+            ranked_quantile(tally.n_used, ranked[Judged(name)].__getitem__, p, confidence) for p in probabilities
+        )
         summaries[name] = summary_of(spreads[name], tuple(quantiles), confidence)
-    return Streamed(summaries, counts, *judge_counted(counts, lambda name, rank: ranked[name][rank], design, looked))
+    return Streamed(
+        summaries, counts, *judge_counted(counts, lambda column, rank: ranked[column][rank], design, looked)
+    )

@@ -1,14 +1,34 @@
 """Ranks of distribution-free tolerance limits: the limits that the cases at hand demonstrate, whatever was required.
 
 An upper limit is the (A + 1)-th largest value when A is the most failures with which so many cases still demonstrate
-the probability (Wilks, Ann. Math. Statist. 12 (1941), 91-96).  Two limits leave A + 1 values out in all, their own two
-among them; which end loses the next one may depend on those lost before (Tukey, Ann. Math. Statist. 18 (1947), 529-539;
-Fraser, Ann. Math. Statist. 22 (1951), 372-381).  Cases without a number are worse than every number and are lost first.
-A limit that would need more cases than there are is None.
+the probability (Wilks, Ann. Math. Statist. 12 (1941), 91-96).  Cases without a number are worse than every number and
+are lost first.  A limit that would need more cases than there are is None.
 
 usable : cases with a number.  accepted : acceptance number of these and of the `no_number` others, None if there is
     none.  Ranks are those of order statistics, 1 ... usable.
 """
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Judged(NamedTuple):
+    """Numbers whose tolerance limit is what a requirement demonstrates: a metric, or how far it is inside two limits.
+
+    A case is between two limits that are both moved inward by a distance where it is inside the nearest of them by that
+    distance: one number with one limit, on whichever side the cases lie.
+    """
+
+    metric: str
+    at_least: float | None = None
+    at_most: float | None = None
+
+    def of(self, values: np.ndarray) -> np.ndarray:
+        """These numbers, float64[n], of the metric's values."""
+        if self.at_least is None or self.at_most is None:
+            return values
+        return np.minimum(self.at_most - values, values - self.at_least)
 
 
 def upper_rank(usable: int, accepted: int | None, no_number: int) -> int | None:
@@ -23,12 +43,3 @@ def lower_rank(usable: int, accepted: int | None, no_number: int) -> int | None:
     """The rank of the value that bounds the share from below."""
     mirrored = upper_rank(usable, accepted, no_number)
     return None if mirrored is None else usable + 1 - mirrored
-
-
-def enclosing_ranks(usable: int, accepted: int | None, no_number: int) -> tuple[int, int] | None:
-    """The ranks of the two values that enclose the share; the ends lose values in turn, the upper one first."""
-    if accepted is None:
-        return None
-    lost = accepted + 1 - no_number
-    above, below = (lost + 1) // 2, lost // 2
-    return None if below < 1 or above + below > usable else (below, usable + 1 - above)

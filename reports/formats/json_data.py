@@ -37,7 +37,7 @@ class RequirementRecord(_Record):
 
     demonstrated_probability : the lower confidence bound on the probability of keeping the limits.
     demonstrated : the tolerance limit of the metric that holds with the required probability and confidence;
-        `enclosed` in its place has two of them where there are two limits.
+        `enclosed` in its place has two of them where there are two limits, both inside by the margin.
     margin : from the demonstrated bound to the nearest limit, negative outside.
     """
 

@@ -80,9 +80,9 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
         demonstrated = _demonstrated(flown, name, limits)
         if limits == Limits() or limits.two_sided:
             low, high = (number(end, 4, spread) for end in (summary.minimum, summary.maximum))
-            rest += [f"{low} to {high} in the cases flown"] if demonstrated else _tails(flown, summary)
-            answer = demonstrated or f"{low} to {with_unit(high, unit)} in the cases flown"
-            yield Card(flown.words(name), f"{answer}{_against(limits, unit)}", f"{'; '.join([*rest, f'from {used}'])}.")
+            rest += [f"demonstrated {demonstrated}"] if demonstrated else _tails(flown, summary)
+            answer = f"{low} to {with_unit(high, unit)} in the cases flown{_against(limits, unit)}"
+            yield Card(flown.words(name), answer, f"{'; '.join([*rest, f'from {used}'])}.")
             continue
         large = limits.at_most is not None
         probability = flown.stated.probability if large else flown.stated.low

@@ -70,7 +70,8 @@ def requirement_table(flown: Flown) -> Table:
     rows = [_requirement_row(flown, *pair) for pair in zip(flown.verdicts, sources, strict=True)]
     note = (
         "Margin: from the demonstrated bound (tolerance limit) to the nearest limit; in brackets, relative to the "
-        "size of the limit, or to half the distance between two. "
+        "size of the limit, or to half the distance between two. Of two limits, the demonstrated bounds are both as "
+        "far inside, or outside, as the margin. "
         f"Demonstrated probability: observed fraction of the cases, in brackets {_bounds_named(flown)}. A failed case, "
         "or one whose metric is not a number, counts as outside."
     )

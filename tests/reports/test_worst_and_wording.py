@@ -47,7 +47,7 @@ def test_the_headline_of_a_two_sided_metric_names_both_ends_and_its_limits():
     run = two_sided(500)
     values = run.table[METRIC]
     card = next(one for one in build(run, "run").costs if one.label == "correction impulse")
-    seen = re.search(r"([−\d.]+) to ([−\d.]+) in the cases flown", card.detail).groups()
+    seen = re.search(r"([−\d.]+) to ([−\d.]+)\u202fm/s in the cases flown", card.answer).groups()
     low, high = (float(one.replace("−", "-")) for one in seen)
     assert (low, high) == pytest.approx((values.min(), values.max()), abs=5e-3)
     assert card.answer.endswith(", limits ±8\u202fm/s")

@@ -15,8 +15,10 @@ from mc_engine.runner.stopping import schedule
 from mc_engine.statistics import binomial, clopper_pearson, quantile_ranks, time_uniform, tolerance
 from mc_engine.statistics.order_statistics import QUANTILES
 from mc_engine.statistics.regions import density_regions
+from mc_engine.statistics.tolerance import Judged
 
 CAMPAIGNS = 5000
+NEAR = (0.5, 4.0)  # limits that the margin to the nearest of two is told to
 SIZES = [59, 300, 1000]
 SLACK, SLACK_STOPPED = 0.015, 0.02
 DISTRIBUTIONS = {
@@ -80,10 +82,11 @@ def test_tolerance_limits_enclose_their_share_of_all_cases_flown_and_failed(n, n
         ordered, failed = np.sort(row[good]), int(n - good.sum())
         high = tolerance.upper_rank(ordered.size, accepted, failed)
         low = tolerance.lower_rank(ordered.size, accepted, failed)
-        ends = tolerance.enclosing_ranks(ordered.size, accepted, failed)
+        inside = np.sort(Judged("x", *NEAR).of(row[good]))
         held["above"].append(np.inf if high is None else ordered[high - 1])
         held["below"].append(-np.inf if low is None else ordered[low - 1])
-        held["both"].append((-np.inf, np.inf) if ends is None else (ordered[ends[0] - 1], ordered[ends[1] - 1]))
+        margin = -np.inf if low is None else inside[low - 1]
+        held["both"].append((NEAR[0] + margin, NEAR[1] - margin))
     inside = 1.0 - lost
     ends = np.array(held["both"])
     before = np.nextafter(ends[:, 0], -np.inf)  # the limit itself is inside

@@ -82,7 +82,8 @@ def test_intervals_of_the_fewest_cases_hold_what_they_say_and_fewer_have_none():
             held[name] += np.all(inside, axis=0)[:, k]
     assert all((number >= 0.75 * 60).all() for number in held.values()), held
     fewer = sensitivity({name: values[:199] for name, values in x.items()}, {"y": y["sum"][:199]})
-    assert np.isnan([fewer.total, fewer.total_error]).all() and np.isfinite(fewer.first_order).all()
+    assert np.isnan([fewer.total, fewer.total_error]).all()
+    assert np.isfinite(fewer.first_order).all()
 
 
 def test_correlated_inputs_have_no_total_index():

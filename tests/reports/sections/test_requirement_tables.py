@@ -81,8 +81,9 @@ def test_a_nominal_case_that_failed_is_told():
 def test_two_limits_show_the_interval_and_its_margin():
     band = {**FUEL, "at_least": -1.0}
     row = texts(requirement_table(flown(2000, campaign=mc(2000), requirements=[band])))[0]
-    low, high = (float(word) for word in row[2].split(" kg")[0].split(" to "))
-    assert 0.0 <= low < high < 2.5
+    low, high = (float(word.replace("−", "-")) for word in row[2].split(" kg")[0].split(" to "))
+    assert -1.0 <= low < high <= 2.5
+    assert low + 1.0 == pytest.approx(2.5 - high, abs=1e-3)
     margin, share = (float(word) for word in row[3].replace(" %)", "").split(" kg ("))
     assert margin == pytest.approx(min(2.5 - high, low + 1.0), abs=1e-3)
     assert share == pytest.approx(100.0 * margin / 1.75, abs=0.1)
@@ -93,7 +94,8 @@ def test_a_key_result_is_what_the_matrix_says_is_demonstrated(lowest):
     band = flown(2000, campaign=mc(2000), requirements=[{**FUEL, "at_least": lowest}])
     demonstrated = requirement_table(band).rows[0][2].text
     card = next(card for card in cost_cards(band) if card.label == "propellant")
-    assert f"{demonstrated} in 99.73\u202f% of cases, 90\u202f% confidence" in card.answer
+    told = card.answer if lowest is None else card.detail
+    assert f"{demonstrated} in 99.73\u202f% of cases, 90\u202f% confidence" in told
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 40])
