@@ -10,7 +10,7 @@ difference of large numbers, and within a Runge-Kutta step two places taken apar
 from collections import namedtuple
 
 from campaigns.deorbit.inputs import CHOICES
-from mc_engine.lanes import any_lane, atan2, exp, physics, replace, sincos, sqrt, where
+from mc_engine.lanes import any_lane, atan2, exp, merged, physics, replace, sincos, sqrt, where
 from mc_engine.lanes.noise import normal_pair
 from mc_engine.model import Event, states
 from mc_engine.physics.atmosphere import layered
@@ -38,11 +38,7 @@ Desired = namedtuple("Desired", "position velocity acceleration radial transvers
 @physics
 def initial(p):
     """State just after the burn."""
-    return State(
-        deviation_x=p.deviation_x, deviation_y=p.deviation_y, deviation_z=p.deviation_z,
-        deviation_vx=p.deviation_vx, deviation_vy=p.deviation_vy, deviation_vz=p.deviation_vz,
-        f_desired=p.f_desired, impulse=0.0, filtered=0.0,
-    )  # fmt: skip
+    return merged(State, p, impulse=0.0, filtered=0.0)
 
 
 @physics
@@ -147,10 +143,7 @@ def law(d, e, w, p, o):
 
 @physics
 def measured(e, rtn, d):
-    """Error of position [m] or velocity [m/s] as the navigation sees it: e, and its own along R, T, N; inertial axes.
-
-    The source's navigation has no errors.
-    """
+    """Error of position [m] or velocity [m/s] as navigation sees it: e and its own along R, T, N (source: none)."""
     normal = cross(d.radial, d.transverse)
     return added_scaled(added_scaled(added_scaled(e, rtn.x, d.radial), rtn.y, d.transverse), rtn.z, normal)
 

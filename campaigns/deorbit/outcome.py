@@ -121,7 +121,6 @@ def evaluate(t, s, m, p, o, best, when):
     spent = p.initial_mass * (1.0 - exp(-s.impulse / p.exhaust))  # (40)
     # not settled at entry is no settling time: such a case counts against a requirement on it
     unsettled = (observe(t, s, m, p, o).unsettled > SETTLED) | (o.control == CHOICES.control.off)
-    _, first_velocity_error = deviation(p)
     first = element_errors(initial(p), p)
     return Metrics(
         propellant=spent,
@@ -140,7 +139,7 @@ def evaluate(t, s, m, p, o, best, when):
         entry_longitude=half_turn(right_ascension - p.greenwich_angle - EARTH_RATE * entry_time),
         entry_right_ascension=right_ascension,
         entry_mass=p.initial_mass - spent,
-        initial_velocity_error=norm(first_velocity_error),
+        initial_velocity_error=norm(deviation(p)[1]),
         actual_semi_major_axis=p.a + first.a,
         actual_eccentricity=p.e + first.e,
         actual_perigee_argument=full_turn(p.omega + first.omega),

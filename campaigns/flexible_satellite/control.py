@@ -8,7 +8,7 @@ from collections import namedtuple
 
 from campaigns.flexible_satellite.dynamics import body_rate, initial
 from campaigns.flexible_satellite.inputs import CHOICES
-from mc_engine.lanes import any_lane, physics, sqrt, where
+from mc_engine.lanes import any_lane, physics, replace, sqrt, where
 from mc_engine.lanes.noise import normal_pair, uniform_pair
 from mc_engine.physics.attitude import second_axis_in_body, turned_slightly
 from mc_engine.physics.pulse_modulators import at_rest, sampled_pulses
@@ -73,8 +73,7 @@ def sign(x):
 def law(q, w, integral, p):
     """Commanded torque [N m] for the vector part of the attitude q and the rate w [rad/s].  (11), (13)-(16)
 
-    The source's (12) and (13) subtract different multiples of qv - qv(0) from the integral; `integral_gamma` is the
-    multiple.
+    The source's (12) and (13) subtract different multiples, here `integral_gamma`, of qv - qv(0) from the integral.
     """
     fast = dot(w, w) >= p.rate_limit * p.rate_limit
     kp, kd, ki = where(fast, p.kp_fast, p.kp), where(fast, p.kd_fast, p.kd), where(fast, p.ki_fast, p.ki)
@@ -99,13 +98,14 @@ def control(s, m, p, o, draws):
     n = integrand(q, w, p)
     integral = added_scaled(m.integral, 0.5 * period, n)  # by trapezoids: m.integral is half a sample behind
     command = law(q, w, integral, p)
-    torque, x, y, z, coming, after = command, m.x, m.y, m.z, m.next, m.then
+    torque = command
     if o.actuator == CHOICES.actuator.pwpf:
-        x, y, z, fx, fy, fz = sampled_pulses(x, y, z, command.x, command.y, command.z, p, period)
-        torque = scaled(p.torque, Vector(fx, fy, fz))
+        x, y, z, fx, fy, fz = sampled_pulses(m.x, m.y, m.z, command.x, command.y, command.z, p, period)
+        m, fired = replace(m, x=x, y=y, z=z), scaled(p.torque, Vector(fx, fy, fz))
+        torque = fired
         if any_lane(p.now < 1.0):  # late valves: the shares now, next and then add to one, derived here
-            after, fired = scaled(p.then, torque), torque
-            torque, coming = added_scaled(m.next, p.now, fired), added_scaled(m.then, p.next, fired)
+            torque = added_scaled(m.next, p.now, fired)
+            m = replace(m, next=added_scaled(m.then, p.next, fired), then=scaled(p.then, fired))
     torque = Vector(p.thrust_x_factor * torque.x, p.thrust_y_factor * torque.y, p.thrust_z_factor * torque.z)
     offset = p.disturbance_offset
     if o.disturbance_draw == CHOICES.disturbance_draw.sample:
@@ -114,7 +114,4 @@ def control(s, m, p, o, draws):
     steady = p.disturbance_amplitude * offset
     body_from_thrusters = Matrix(p.axx, p.axy, p.axz, p.ayx, p.ayy, p.ayz, p.azx, p.azy, p.azz)
     body = added(matrix_times(body_from_thrusters, torque), Vector(steady, steady, steady))
-    return Memory(
-        integral=added_scaled(m.integral, period, n), command=command, torque=torque, body=body,
-        x=x, y=y, z=z, next=coming, then=after,
-    )  # fmt: skip
+    return replace(m, integral=added_scaled(m.integral, period, n), command=command, torque=torque, body=body)

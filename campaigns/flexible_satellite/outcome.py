@@ -2,7 +2,7 @@
 
 from campaigns.flexible_satellite.dynamics import AXES, MODES, body_rate
 from campaigns.flexible_satellite.inputs import CHOICES
-from mc_engine.lanes import atan2, maximum, minimum, physics, sqrt, where
+from mc_engine.lanes import atan2, maximum, merged, minimum, physics, sqrt, where
 from mc_engine.model import Field, at_end, last_above, maximum_of, metrics, outputs
 from mc_engine.physics.vectors import Vector, norm
 
@@ -68,18 +68,12 @@ Metrics = metrics(
 def observe(s, m, p):
     """Outputs, SI and radians."""
     w = body_rate(s, p)
-    return Outputs(
-        q0=s.q0,
-        q1=s.q1,
-        q2=s.q2,
-        q3=s.q3,
+    return merged(
+        Outputs,
+        s,
         omega_x=w.x,
         omega_y=w.y,
         omega_z=w.z,
-        eta_1=s.eta_1,
-        eta_2=s.eta_2,
-        eta_3=s.eta_3,
-        eta_4=s.eta_4,
         command_x=m.command.x,
         command_y=m.command.y,
         command_z=m.command.z,
@@ -121,9 +115,9 @@ def fired(impulse, thrust, p, o):
 @physics
 def evaluate(s, m, p, o):
     """The metrics that the engine does not compute, at the end, SI; propellant (23)."""
-    return Metrics(
-        attitude_effort=s.attitude_effort,
-        scalar_effort=s.scalar_effort,
+    return merged(
+        Metrics,
+        s,
         q_vector_norm=vector_norm(s),
         eta_norm=sqrt(s.eta_1 * s.eta_1 + s.eta_2 * s.eta_2 + s.eta_3 * s.eta_3 + s.eta_4 * s.eta_4),
         pulse_count=m.x.pulses + m.y.pulses + m.z.pulses,
@@ -134,9 +128,6 @@ def evaluate(s, m, p, o):
         on_time_x=fired(s.impulse_x, p.thrust_x_factor, p, o),
         on_time_y=fired(s.impulse_y, p.thrust_y_factor, p, o),
         on_time_z=fired(s.impulse_z, p.thrust_z_factor, p, o),
-        impulse_x=s.impulse_x,
-        impulse_y=s.impulse_y,
-        impulse_z=s.impulse_z,
         propellant_x=s.impulse_x / p.exhaust_arm,
         propellant_y=s.impulse_y / p.exhaust_arm,
         propellant_z=s.impulse_z / p.exhaust_arm,

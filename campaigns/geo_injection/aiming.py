@@ -17,7 +17,7 @@ from campaigns.geo_injection.inputs import CHOICES
 from campaigns.geo_injection.program_table import Nominal, Polynomial, Steering, burn_row, nominal
 from mc_engine.lanes import atan2, exp, floor, log, maximum, physics, sincos, sqrt, where
 from mc_engine.physics.constants import MU_EARTH
-from mc_engine.physics.vectors import Matrix, Vector, added, added_scaled, cross, dot, norm, scaled, subtracted
+from mc_engine.physics.vectors import Vector, added, added_scaled, cross, dot, norm, scaled, subtracted
 
 # unit vector; stretch: of the duration; sensed: speed change at which the burn is shut down [m/s]; ignition: time [s]
 Aim = namedtuple("Aim", "x y z stretch sensed ignition")
@@ -171,15 +171,10 @@ def turned(steering, aim, o):
     a = nominal(o.tables)
     w = cross(a, aim)
     k = 1.0 / maximum(1.0 + a.x * aim.x + a.y * aim.y + a.z * aim.z, 1e-9)
-    to = Matrix(
-        xx=1.0 - k * (w.y * w.y + w.z * w.z), xy=k * w.x * w.y - w.z, xz=k * w.x * w.z + w.y,
-        yx=k * w.x * w.y + w.z, yy=1.0 - k * (w.x * w.x + w.z * w.z), yz=k * w.y * w.z - w.x,
-        zx=k * w.x * w.z - w.y, zy=k * w.y * w.z + w.x, zz=1.0 - k * (w.x * w.x + w.y * w.y),
-    )  # fmt: skip
     return Steering(
-        x=_combined(steering, to.xx, to.xy, to.xz),
-        y=_combined(steering, to.yx, to.yy, to.yz),
-        z=_combined(steering, to.zx, to.zy, to.zz),
+        x=_combined(steering, 1.0 - k * (w.y * w.y + w.z * w.z), k * w.x * w.y - w.z, k * w.x * w.z + w.y),
+        y=_combined(steering, k * w.x * w.y + w.z, 1.0 - k * (w.x * w.x + w.z * w.z), k * w.y * w.z - w.x),
+        z=_combined(steering, k * w.x * w.z - w.y, k * w.y * w.z + w.x, 1.0 - k * (w.x * w.x + w.y * w.y)),
     )
 
 

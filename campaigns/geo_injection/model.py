@@ -9,8 +9,7 @@ import numpy as np
 from campaigns.geo_injection import dynamics, outcome
 from campaigns.geo_injection.aiming import nominal_impulse
 from campaigns.geo_injection.design.coast import kepler
-from campaigns.geo_injection.design.program import Program, program_for
-from campaigns.geo_injection.design.sequence import Sequence, source_orbits
+from campaigns.geo_injection.design.program import Program, Sequence, program_for, source_orbits
 from campaigns.geo_injection.inputs import AXES, CHOICES, Inputs
 from campaigns.geo_injection.program_table import table_of
 from mc_engine.errors import ModelError
@@ -47,8 +46,8 @@ def sequence_of(o: Any) -> Sequence:
 
 def _transfer(o: Any, k: int, of_source: tuple[float, float, float]) -> tuple[float, float, float]:
     """(semi-major axis, eccentricity, plane change so far) of the orbit after burn k: as set, or the source's."""
-    a, e = float(getattr(o, f"transfer_{k}_semi_major_axis")), float(getattr(o, f"transfer_{k}_eccentricity"))
-    change = float(getattr(o, f"transfer_{k}_plane_change"))
+    parts = ("semi_major_axis", "eccentricity", "plane_change")
+    a, e, change = (float(getattr(o, f"transfer_{k}_{part}")) for part in parts)
     if 0.0 < a < WGS84_RADIUS:
         raise ModelError(
             f"transfer_{k}_semi_major_axis_km is below the Earth's radius; an orbit lies above, and 0 is the source's"
@@ -98,8 +97,7 @@ def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -
 def _first_states(i: SimpleNamespace, program: Program) -> np.ndarray:
     """Place [m] and velocity [m/s], float64[6, n], inertial, at the actual first ignition.
 
-    Errors count in the radial, transverse and normal axes of the nominal state at its time; from there the stage
-    coasts (19)-(21), forward or backward, to the actual ignition.
+    Errors count in the axes of the nominal state; from there the stage coasts to the actual ignition: (19)-(21).
     """
     r, v = np.reshape(program.start, (2, 3))
     normal = np.cross(r, v)

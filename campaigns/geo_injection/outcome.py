@@ -5,7 +5,7 @@ from collections import namedtuple
 from campaigns.geo_injection.aiming import pole, velocity
 from campaigns.geo_injection.dynamics import COAST, direction, level_of
 from campaigns.geo_injection.program_table import nominal
-from mc_engine.lanes import asin, atan2, maximum, minimum, physics, sincos, sqrt, where
+from mc_engine.lanes import asin, atan2, maximum, merged, minimum, physics, sincos, sqrt, where
 from mc_engine.model import Field, at_end, metrics, outputs
 from mc_engine.physics.constants import MU_EARTH
 from mc_engine.physics.vectors import cross, dot, norm, scaled, subtracted
@@ -47,7 +47,7 @@ Metrics = metrics(
     burn_out_2_s=Field("end of the second burn", low=0.0, unit="s"),
     last_burn_out_s=Field("end of the last burn", low=0.0),
 )
-Orbit = namedtuple("Orbit", "a e h r radial speed")  # h: angular momentum, a vector
+Orbit = namedtuple("Orbit", "a e h radius speed radial_speed")  # h: angular momentum, a vector
 
 
 @physics
@@ -56,7 +56,8 @@ def orbit_of(s):
     v, r = velocity(s), norm(s)
     v2, rv = dot(v, v), dot(s, v)
     e = norm(subtracted(scaled(v2 / MU_EARTH - 1.0 / r, s), scaled(rv / MU_EARTH, v)))
-    return Orbit(a=1.0 / (2.0 / r - v2 / MU_EARTH), e=e, h=cross(s, v), r=r, radial=rv / r, speed=sqrt(v2))
+    a = 1.0 / (2.0 / r - v2 / MU_EARTH)
+    return Orbit(a=a, e=e, h=cross(s, v), radius=r, speed=sqrt(v2), radial_speed=rv / r)
 
 
 @physics
@@ -65,15 +66,11 @@ def observe(t, s, m, p):
     orbit = orbit_of(s)
     # on a coast no later than the segment's end, beyond which the polynomial has no meaning
     to = direction(where(m.phase == COAST, minimum(t, m.arc.middle + 1.0 / m.arc.rate), t), m)
-    return Outputs(
-        x=s.x,
-        y=s.y,
-        z=s.z,
-        radius=orbit.r,
-        speed=orbit.speed,
-        radial_speed=orbit.radial,
-        flight_path_angle=asin(orbit.radial / orbit.speed),
-        mass=s.mass,
+    return merged(
+        Outputs,
+        s,
+        orbit,
+        flight_path_angle=asin(orbit.radial_speed / orbit.speed),
         acceleration=level_of(t, m, p) * p.thrust / s.mass,
         thrust_right_ascension=atan2(to.y, to.x),
         thrust_declination=atan2(to.z, sqrt(to.x * to.x + to.y * to.y)),
@@ -118,7 +115,7 @@ def evaluate(t, s, m, p, o):
         node=atan2(orbit.h.x, -orbit.h.y),
         perigee_radius=perigee,
         apogee_radius=apogee,
-        radius_error=orbit.r - radius,
+        radius_error=orbit.radius - radius,
         longitude_drift=sqrt(MU_EARTH / a) / a - sqrt(MU_EARTH / radius) / radius,
         in_plane_correction=in_plane,
         plane_correction=plane,

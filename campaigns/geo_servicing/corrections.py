@@ -8,8 +8,7 @@ CUT_OFF     end the burn                                    IGNITION, DECISION (
 DECISION    inspection: choose the next coast               IGNITION or DECISION
 DAY_LATER   phasing: evaluate the sidereal day after        NOTHING
 
-In the phasing, corrections follow the plan, with feedback on what navigation measures at ignition.  In the inspection
-the law chooses each coast and each correction.
+The phasing follows the plan, with feedback on what navigation measures at ignition; the inspection follows the law.
 """
 
 from collections import namedtuple
@@ -18,10 +17,10 @@ from typing import NamedTuple
 from campaigns.geo_servicing.drift_model import DRIFT_PER_DV
 from campaigns.geo_servicing.dynamics import MU, RATE, SIDEREAL_DAY, longitudes
 from campaigns.geo_servicing.inputs import CHOICES
-from campaigns.geo_servicing.inspection import next_coast, next_pair, relative_orbit, velocity_change
+from campaigns.geo_servicing.inspection import ends, next_coast, relative_orbit, velocity_change
 from campaigns.geo_servicing.navigation import EXACT, NO_ESTIMATE, Error, Estimate, burnt, navigated_elements
 from campaigns.geo_servicing.plan_table import corrections, planned
-from mc_engine.lanes import any_lane, atan, exp, maximum, physics, replace, sincos, sqrt, where
+from mc_engine.lanes import any_lane, atan, exp, maximum, minimum, physics, replace, sincos, sqrt, where
 from mc_engine.model import Event
 from mc_engine.physics.frames import TURN, half_turn
 from mc_engine.physics.radiation import discs
@@ -34,6 +33,7 @@ SHORTEST_BURN = 1e-6  # s
 
 # velocity change that is commanded [m/s]; thrust [N] outward, ahead and to the normal
 Burn = namedtuple("Burn", "dv outward ahead across")
+NO_BURN = Burn(0.0, 0.0, 0.0, 0.0)
 # at the end of the last phasing burn, SI and radians, by the names of outputs and metrics; longitude_sum: of the state
 TransferEnd = namedtuple(
     "TransferEnd",
@@ -50,7 +50,7 @@ class Memory(NamedTuple):
     due: float = NEVER
     mode: float = NOTHING
     burns: float = 0.0  # so far
-    burn: Burn = Burn(0.0, 0.0, 0.0, 0.0)
+    burn: Burn = NO_BURN
     settled: float = 0.0  # 1 once the inspection counts as settled
     second: float = 0.0  # 1 between two burns that make a pair
     end: TransferEnd = NO_END
@@ -67,8 +67,7 @@ def start(o):
     if o.phase == CHOICES.phase.inspection:
         return Memory(due=maximum(o.observation, FIRST_LOOK), mode=DECISION)
     if o.phase == CHOICES.phase.phasing:
-        if corrections(o.tables) > 0.5:
-            return Memory(due=planned(o.tables, 0.0).ignition, mode=IGNITION)
+        return Memory(due=planned(o.tables, 0.0).ignition, mode=IGNITION)
     return Memory()
 
 
@@ -76,7 +75,7 @@ def start(o):
 def shadow_edges(t, s, p, o):
     """Angles [rad] of the Sun from the edges of the Earth's shadow, seen from the craft; 1 where sunlight has no push.
 
-    At the edges nothing is done: steps end there, since the light has corners that no step may go over.
+    Steps end at the edges, corners of the light that no step may go over.
     """
     if o.sunlight > 0.5:
         sx, sy, sz, _, _, _ = ephemeris(p.sun_moon_time + t, o.tables, p.sun_moon)
@@ -117,54 +116,37 @@ def ended(t, s, p):
 
 @physics
 def phasing_change(t, s, m, p, o):
-    """Velocity change [m/s] of the present correction: the plan's, and feedback on the deviation from the plan.
-
-    The deviations are those of the mean longitude [rad] and the drift [rad/rev] that navigation measures.
-    """
+    """Velocity change [m/s] of the present correction: the plan's, with feedback on measured deviations from it."""
     plan = planned(o.tables, m.burns)
     dv = plan.dv
     if o.feedback > 0.5:
         x = navigated_elements(s, m.estimate)
-        y = half_turn(x.mean - (p.aim + RATE * t)) - plan.longitude
-        v = drift_of(x.a) - plan.drift
+        y = half_turn(x.mean - (p.aim + RATE * t)) - plan.longitude  # of the mean longitude [rad]
+        v = drift_of(x.a) - plan.drift  # [rad/rev]
         dv = dv - (plan.gain_y * y + plan.gain_v * v) / DRIFT_PER_DV
     return dv
 
 
 @physics
 def of_burn(k, a, b, c, d, e):
-    """The value that belongs to burn k, counted from 0, in its own unit."""
+    """The value that belongs to burn k, counted from 0."""
     return where(k < 0.5, a, where(k < 1.5, b, where(k < 2.5, c, where(k < 3.5, d, e))))
 
 
 @physics
-def execution(m, p, o):
-    """(thrust error, tilt outward [rad], tilt to the normal [rad]) of the present burn.
-
-    In phasing those of the case; in the inspection fresh ones, besides what holds for all its burns.
-    """
+def ignited(t, s, m, p, o):
+    """The memory as a burn begins, m c (1 - exp(-|dv|/c)) / F long; errors stretch its thrust and tilt it."""
     thrust = of_burn(m.burns, p.thrust_1, p.thrust_2, p.thrust_3, p.thrust_4, p.thrust_5)
     radial = of_burn(m.burns, p.radial_1, p.radial_2, p.radial_3, p.radial_4, p.radial_5)
     normal = of_burn(m.burns, p.normal_1, p.normal_2, p.normal_3, p.normal_4, p.normal_5)
-    if o.phase == CHOICES.phase.inspection:
+    if o.phase == CHOICES.phase.inspection:  # fresh errors, besides those that hold for all burns
         thrust = thrust + p.thrust_noise * m.d1
         radial, normal = radial + p.pointing_noise * m.d2, normal + p.pointing_noise * m.d3
-    return thrust, radial, normal
-
-
-@physics
-def ignited(t, s, m, p, o):
-    """The memory as the present burn begins.
-
-    Duration by the rocket equation, m c (1 - exp(-|dv|/c)) / F; the errors stretch the thrust and tilt it.
-    """
-    if o.phase == CHOICES.phase.phasing:
-        dv = phasing_change(t, s, m, p, o)
-    else:
         dv = velocity_change(relative_orbit(s, m.estimate), 1.0 - m.second, p, o)
+    else:
+        dv = phasing_change(t, s, m, p, o)
     length = s.mass_left * p.exhaust / o.thrust * (1.0 - exp(-abs(dv) / p.exhaust))
-    error, radial, normal = execution(m, p, o)
-    push = o.thrust * (1.0 + error)
+    push = o.thrust * (1.0 + thrust)
     sine_r, cosine_r = sincos(radial)
     sine_n, cosine_n = sincos(normal)
     ahead = where(dv < 0.0, -push, push)
@@ -176,18 +158,14 @@ def ignited(t, s, m, p, o):
 def cut_off(m, o):
     """The memory after a burn.
 
-    A filter adds what the burn gave over the command to its error, and the assumed errors to its covariance; without a
-    filter there is a fix of its own, so that what is decided now does not share the errors of the ignition.
+    Without a filter there is a fix of its own, so that what is decided now does not share the errors of the ignition.
     """
-    e, burn = m.estimate, m.burn
+    e = m.estimate
     if o.navigation == CHOICES.navigation.filtered:
-        # what the burn gave: the command, stretched and tilted
-        size = abs(burn.dv)
-        outward, ahead = size * burn.outward / o.thrust, size * burn.ahead / o.thrust
-        e = burnt(e, outward, ahead - burn.dv, size, o.assumed_thrust, o.assumed_pointing)
+        e = burnt(e, m.burn, o)
     elif o.navigation == CHOICES.navigation.raw:
         e = replace(e, r=m.after.r, s=m.after.s, u=m.after.u, w=m.after.w)
-    return replace(m, burns=m.burns + 1.0, burn=replace(burn, outward=0.0, ahead=0.0, across=0.0), estimate=e)
+    return replace(m, burns=m.burns + 1.0, burn=NO_BURN, estimate=e)
 
 
 @physics
@@ -216,7 +194,7 @@ def decided(t, s, m, cut, p, o):
     x = relative_orbit(s, m.estimate)
     if o.inspection_law == CHOICES.inspection_law.pairs:
         second = where(cut, 1.0 - m.second, 0.0)
-        coast, burns = where(second > 0.5, 0.5, next_pair(x, p, o)), 1.0
+        coast, burns = where(second > 0.5, 0.5, minimum(*ends(x, p, o))), 1.0
     else:
         (coast, burns), second = next_coast(x, p, o), 0.0
     return replace(m, due=t + SIDEREAL_DAY * coast, mode=where(burns > 0.5, IGNITION, DECISION), second=second)

@@ -1,7 +1,7 @@
 """Angular motion near a geostationary place to first order, first approximations of a phasing, feedback.  NumPy.
 
 Longitudes in the unit of the drift, drift per revolution (sidereal day), east positive; times in revolutions unless a
-name says otherwise.  Numbers in brackets are equations of the source (`model.SOURCE`).
+name says otherwise.  Numbers in brackets are equations of the source (`MODEL.source`).
 """
 
 import numpy as np
@@ -41,12 +41,10 @@ def braking(y, v, last, shortest):
 
     last : size of the last correction;  shortest : float64[n], least coasts
     """
-    n, sign = len(shortest), np.sign(v)
-    u = np.full(n, -(abs(v) - last) / (n - 1) * sign)
-    u[-1] = -last * sign
-    t = np.array(shortest, dtype=np.float64)
-    drift = v + np.concatenate([[0.0], np.cumsum(u)[:-1]])
-    t[0] = max(t[0], -(y + (drift[1:] * t[1:]).sum()) / v)
+    n, sign, t = len(shortest), np.sign(v), shortest.copy()
+    u = np.append(np.full(n - 1, -(abs(v) - last) / (n - 1) * sign), -last * sign)
+    drift = v + np.cumsum(u)[:-1]  # in the later coasts
+    t[0] = max(t[0], -(y + (drift * t[1:]).sum()) / v)
     return u, t
 
 
@@ -56,12 +54,11 @@ def fastest(y, v, last, shortest):
     The first as of two that bring longitude and drift to zero, derived here: v + u1 + u2 = 0 and y + v first +
     (v + u1) later = 0; the rest as in `braking`, (3.32)-(3.35), from the state after the first.
     """
-    t = np.array(shortest, dtype=np.float64)
-    first, later = t[0], t[1:].sum()
+    first, later = shortest[0], shortest[1:].sum()
     u1 = -(y + v * (first + later)) / later
     after = y + v * first, v + u1
-    u, rest = braking(*after, last, t[1:]) if len(t) > 2 else (np.array([-after[1]]), t[1:])
-    return np.concatenate([[u1], u]), np.concatenate([t[:1], rest])
+    u, rest = braking(*after, last, shortest[1:]) if len(shortest) > 2 else ([-after[1]], shortest[1:])
+    return np.append(u1, u), np.append(first, rest)
 
 
 def best_corrections(a, b, weight, terminal, sigma):
@@ -81,9 +78,7 @@ def best_corrections(a, b, weight, terminal, sigma):
 
 
 def planned_cost(b, costs, u, sigma) -> float:
-    """Mean cost, in the unit of `costs`, that the execution errors of planned corrections leave if later ones answer.
-
-    u : float64[n], the corrections.
+    """Mean cost, in the unit of `costs`, that errors of planned corrections u, float64[n], leave if later ones answer.
 
     Derived here from the recursion: correction k adds the variance (sigma u_k)^2 along b_k, which costs_{k+1} weighs.
     """

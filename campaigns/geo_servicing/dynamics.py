@@ -8,10 +8,10 @@ from typing import Any
 
 from campaigns.geo_servicing import plan_table
 from campaigns.geo_servicing.inputs import CHOICES
-from mc_engine.lanes import any_lane, atan2, merged, physics, sincos
+from mc_engine.lanes import any_lane, atan2, merged, physics
 from mc_engine.model import states
-from mc_engine.physics.earth_frames import ric_from_eci
-from mc_engine.physics.frames import half_turn, turned
+from mc_engine.physics.earth_frames import ecef_to_eci, eci_to_ecef, ric_from_eci
+from mc_engine.physics.frames import half_turn
 from mc_engine.physics.geopotential import MU_EGM2008, RADIUS_EGM2008, harmonics
 from mc_engine.physics.gravity import point_mass
 from mc_engine.physics.orbital_elements import equinoctial
@@ -55,13 +55,9 @@ def field(t, r, sun, moon, per_mass, p, o):
     """
     g = Vector(*point_mass(r.x, r.y, r.z, MU))
     if o.gravity_degree > 1.0:
-        sine, cosine = sincos(p.sidereal + RATE * t)
-        bx, by = turned(r.x, r.y, cosine, sine)
-        hx, hy, hz = harmonics(
-            bx, by, r.z, MU, RADIUS_EGM2008, o.gravity_degree, o.gravity_order, o.tables, plan_table.LENGTH
-        )
-        hx, hy = turned(hx, hy, cosine, -sine)
-        g = added(g, Vector(hx, hy, hz))
+        b, rows = eci_to_ecef(r, p.sidereal + RATE * t), plan_table.LENGTH
+        h = harmonics(b.x, b.y, b.z, MU, RADIUS_EGM2008, o.gravity_degree, o.gravity_order, o.tables, rows)
+        g = added(g, ecef_to_eci(Vector(*h), p.sidereal + RATE * t))
     if o.sun_and_moon > 0.5:
         g = added(g, Vector(*third_body(r.x, r.y, r.z, sun.x, sun.y, sun.z, MU_SUN)))
         g = added(g, Vector(*third_body(r.x, r.y, r.z, moon.x, moon.y, moon.z, MU_MOON)))
@@ -80,9 +76,8 @@ def longitudes(t, s, p):
 @physics
 def true_deviation(t, s, p):
     """Longitude of the servicing module less the required one [rad]."""
-    sine, cosine = sincos(p.aim + RATE * t)
-    x, y = turned(s.x, s.y, cosine, sine)
-    return atan2(y, x)
+    r = eci_to_ecef(s, p.aim + RATE * t)
+    return atan2(r.y, r.x)
 
 
 @physics

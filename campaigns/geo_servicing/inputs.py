@@ -97,9 +97,7 @@ Inputs = inputs(
         dispersed_by="reflectivity_factor",
         unit="",
     ),
-    initial_longitude_deg=Setting(
-        92.5, "planned longitude at the start, east", low=-360.0, high=360.0, dispersed_by="initial_longitude_error_deg"
-    ),
+    initial_longitude_deg=_planned(92.5, "east longitude", -360.0, 360.0, "initial_longitude_error_deg"),
     initial_period_s=_planned(85796.0, "osculating period", 3e4, 3e5, "initial_period_error_s", "s"),
     initial_eccentricity=_planned(0.0005, "eccentricity", 0.0, 0.5, "initial_eccentricity_error", ""),
     initial_inclination_deg=_planned(0.1, "inclination", 0.0, 90.0, "initial_inclination_error_deg"),
@@ -133,9 +131,7 @@ Inputs = inputs(
     assumed_pointing_deg=Setting(0.5, "1-sigma of the tilt that the filter expects", low=0.0),
     geometry=Setting("behind", "position of the module relative to the target", choices=("behind", "ahead", "around")),
     inspection_law=Setting(
-        "single",
-        "one correction at a time, or pairs that remove the relative ellipse",
-        choices=("single", "pairs"),
+        "single", "one correction at a time, or pairs that remove the relative ellipse", choices=("single", "pairs")
     ),
     observation_days=Setting(0.0, "time before the inspection first decides", low=0.0),
     settle_time_days=Setting(15.0, "time from which the inspection counts as settled", low=0.0),

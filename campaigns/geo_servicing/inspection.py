@@ -1,6 +1,6 @@
 """The inspection law: when to correct, and by how much, so that the module keeps its distance from the target.
 
-Numbers in brackets are equations of the source (`model.SOURCE`); the procedure around them is the README's.
+Numbers in brackets are equations of the source (`MODEL.source`); the procedure around them is the README's.
 """
 
 from collections import namedtuple
@@ -63,15 +63,15 @@ def wait_until(x, phase, least):
 
 
 @physics
-def least_wait(p, o):
-    """Least coast [rev] before a correction."""
-    return maximum(o.least_coast / SIDEREAL_DAY, p.coast_revolutions - LAST)
+def ends(x, p, o):
+    """Coasts [rev] to the next lowest and highest point of the relative ellipse that are far enough away."""
+    least = maximum(o.least_coast / SIDEREAL_DAY, p.coast_revolutions - LAST)
+    return wait_until(x, 0.0, least), wait_until(x, 0.5 * TURN, least)
 
 
 @physics
-def candidate(x, phase, sign, p, o):
-    """Coast [rev] to a phase at which the law asks for a correction of this sign; `NEVER` where it asks for another."""
-    wait = wait_until(x, phase, least_wait(p, o))
+def candidate(x, wait, sign, p, o):
+    """The coast [rev] where the law then asks for a correction of this sign; `NEVER` where it asks for another."""
     return where(asked(x.along - p.nominal + x.drift * wait, x.drift, p, o) * sign > 0.0, wait, NEVER)
 
 
@@ -81,19 +81,11 @@ def next_coast(x, p, o):
 
     A relative ellipse that is wider than wanted is corrected where that makes it narrower, and the other way about.
     """
-    narrow = x.e < p.around
-    high = where(narrow, 0.5 * TURN, 0.0)
-    # u > 0: braking
-    wait = minimum(candidate(x, high, 1.0, p, o), candidate(x, 0.5 * TURN - high, -1.0, p, o))
+    low, high = ends(x, p, o)
+    braking = where(x.e < p.around, -1.0, 1.0)  # sign of u at the lowest point
+    wait = minimum(candidate(x, low, braking, p, o), candidate(x, high, -braking, p, o))
     wanted = wait < NEVER
     return where(wanted, wait, 1.0), where(wanted, 1.0, 0.0)
-
-
-@physics
-def next_pair(x, p, o):
-    """Coast [rev] to the first burn of a pair: to the next end of the relative ellipse that is far enough away."""
-    least = least_wait(p, o)
-    return minimum(wait_until(x, 0.0, least), wait_until(x, 0.5 * TURN, least))
 
 
 @physics
@@ -103,9 +95,7 @@ def first_of_pair(x, p, o):
     Both together change the eccentricity vectors' difference by what is too much of it, u_a - u_p = -+E with E the
     drift that belongs to V0 (e - wanted)/2, and u_p is the law's at its own time; two equations, solved for u_a.
     """
-    q = p.coast_revolutions * p.coast_revolutions + 2.0 * p.chi2 * p.coast_revolutions + p.chi1
-    size = p.control_weight + (1.0 + o.assumed_thrust * o.assumed_thrust) * q
-    g_y, g_v = (p.coast_revolutions + p.chi2) / size, q / size
+    g_y, g_v = -asked(1.0, 0.0, p, o), -asked(0.0, 1.0, p, o)  # gains of the law, which is linear
     low = where(abs(half_turn(x.phase)) < 0.25 * TURN, 1.0, -1.0)  # in the lower half of the relative ellipse
     apart = low * 1.5 * TURN * R0 * (x.e - p.around)  # drift of V0 e/2: 6 pi/w V0 e/2 = 3 pi R0 e
     y = x.along - p.nominal
@@ -115,10 +105,7 @@ def first_of_pair(x, p, o):
 
 @physics
 def velocity_change(x, first, p, o):
-    """Transverse velocity change [m/s] that the law asks for now: -u w / (6 pi), u in m/rev.
-
-    first : 1 for the first burn of a pair
-    """
+    """Transverse velocity change [m/s] that the law asks for now: -u w / (6 pi), u in m/rev; first : 1 of a pair's."""
     u = asked(x.along - p.nominal, x.drift, p, o)
     if o.inspection_law == CHOICES.inspection_law.pairs:
         u = where(first > 0.5, first_of_pair(x, p, o), u)

@@ -13,26 +13,19 @@ from campaigns.geo_servicing.phasing_plan import plan_of
 from mc_engine.errors import ModelError
 from mc_engine.model import AdaptiveStep, Parameter, Refusals, declared_in, kept_design, model, prepared
 from mc_engine.model.figures import HistoryFigure, ProfileFigure, ScatterFigure
+from mc_engine.physics import geopotential, sun_moon
 from mc_engine.physics.constants import STANDARD_GRAVITY
 from mc_engine.physics.frames import TURN
-from mc_engine.physics.geopotential import COLUMNS, harmonics_rows, harmonics_table
 from mc_engine.physics.orbital_elements import state_of_elements
-from mc_engine.physics.sun_moon import COLUMNS as SUN_MOON
-from mc_engine.physics.sun_moon import SPACING, ephemeris_table, node_before, sidereal_angle
 from mc_engine.studies.published import read_published
 
-SOURCE = (
-    "Hoang Vu Tan, Development of motion control algorithms for a spacecraft of a geostationary communication "
-    "satellite servicing system (in Russian), Candidate of Technical Sciences dissertation, Moscow Aviation Institute, "
-    "Moscow, 2021"
-)
 _DAY = 86_400.0
 
 
 def prepare(i: SimpleNamespace, o: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
     """Kernel parameters of each case, SI; i : inputs;  o : settings, codes."""
     epoch = o.epoch_utc + i.epoch_error / _DAY
-    sidereal = sidereal_angle(epoch)
+    sidereal = sun_moon.sidereal_angle(epoch)
     two, around = o.phase == CHOICES.phase.inspection, o.geometry == CHOICES.geometry.around
     refusals.add(o.gravity_order > o.gravity_degree, "gravity_order is above gravity_degree")
     refusals.add(o.gravity_degree == 1.0, "the geopotential has no harmonics of degree 1; take 0, or 2 and above")
@@ -90,16 +83,16 @@ def craft_start(i: SimpleNamespace, name: str) -> np.ndarray:
 
 def _sun_moon_rows(epoch: np.ndarray, o: SimpleNamespace) -> dict[str, np.ndarray]:
     """The nodes that the chunk's flights need, where each case finds its first, and the time [s] since that."""
-    number, time = node_before(epoch)
+    number, time = sun_moon.node_before(epoch)
     # from the node before the start to two behind the end: the cubic takes one, a look past the last step another
-    nodes = np.ceil((o.duration / _DAY) / SPACING) + 3.0
+    nodes = np.ceil((o.duration / _DAY) / sun_moon.SPACING) + 3.0
     nodes[np.isnan(number)] = 0.0
     first, last = int(np.nanmin(number)), int(np.nanmax(number + nodes))
-    before = plan_table.LENGTH + COLUMNS * harmonics_rows(o.gravity_degree, o.gravity_order)
+    before = plan_table.LENGTH + geopotential.COLUMNS * geopotential.harmonics_rows(o.gravity_degree, o.gravity_order)
     return {
-        "sun_moon": before + SUN_MOON * (number - first),
+        "sun_moon": before + sun_moon.COLUMNS * (number - first),
         "sun_moon_time": time,
-        "tables": ephemeris_table(first, last),
+        "tables": sun_moon.ephemeris_table(first, last),
     }
 
 
@@ -109,22 +102,21 @@ Parameters = prepared(prepare, Inputs)
 def tables(o: Any) -> np.ndarray:
     """The phasing plan and the harmonics of the geopotential, for the settings o."""
     plan = kept_design(plan_of, *nominal_start(o)) if o.phase == CHOICES.phase.phasing else np.zeros(plan_table.LENGTH)
-    return np.concatenate([plan, harmonics_table(int(o.gravity_degree), int(o.gravity_order)).ravel()])
+    return np.append(plan, geopotential.harmonics_table(int(o.gravity_degree), int(o.gravity_order)))
 
 
 def nominal_start(o: Any) -> tuple[Any, Any]:
     """(settings with the tables of a flight without a plan, kernel parameters, SI) of the case without errors."""
     defaults = [item for item in Inputs.declared if isinstance(item, Parameter)]
     inputs = SimpleNamespace(**{item.symbol: np.array([item.default * item.si_factor]) for item in defaults})
-    settings = SimpleNamespace(**{name: np.array([value]) for name, value in o._asdict().items()})
-    # a plan may end after the flight
-    settings.duration = np.maximum(settings.duration, settings.longest_transfer + 2.0 * _DAY)
+    longest = o._replace(duration=max(o.duration, o.longest_transfer + 2.0 * _DAY))  # a plan may end after the flight
+    settings = SimpleNamespace(**{name: np.array([value]) for name, value in longest._asdict().items()})
     refusals = Refusals.none(1)
     columns = prepare(inputs, settings, refusals)
     if refusals.mask.any():
         raise ModelError(f"there is no plan: {refusals.reason[0]}")
     # no plan yet, as in the tables of a free flight: for the phasing `tables` would ask for the plan itself
-    unplanned = np.concatenate([tables(o._replace(phase=CHOICES.phase.free)), columns.pop("tables").ravel()])
+    unplanned = np.append(tables(o._replace(phase=CHOICES.phase.free)), columns.pop("tables"))
     return o._replace(tables=unplanned), Parameters(**{name: float(np.ravel(row)[0]) for name, row in columns.items()})
 
 
@@ -151,7 +143,9 @@ FIGURES = (
 MODEL = model(
     name="geo_servicing",
     title="Servicing a geostationary satellite",
-    source=SOURCE,
+    source="Hoang Vu Tan, Development of motion control algorithms for a spacecraft of a geostationary communication "
+    "satellite servicing system (in Russian), Candidate of Technical Sciences dissertation, Moscow Aviation Institute, "
+    "Moscow, 2021",
     inputs=Inputs,
     clock=AdaptiveStep("duration", "tolerance", dynamics.tolerances(1e-4, 1e-8), control_period=sample_period),
     kernel_parameters=Parameters,

@@ -4,9 +4,9 @@ The estimate is the true state plus an error; the error is what is kept.  It has
 [m/s] outward and ahead: the motion out of the plane is not controlled and does not act on the one in it.  In the
 inspection the error is that of the relative navigation of both craft.
 
-The filter is a Kalman filter on Hill's equations.  Its error obeys the same equations without the model's help, so no
-estimate need be integrated beside the flight: between fixes error and covariance go on by Hill's solution, a fix takes
-its share off both, and a burn adds what it did differently from the command.
+The filter is a Kalman filter on Hill's equations, which its error obeys, too; no estimate is integrated beside the
+flight.  Between fixes error and covariance go on by Hill's solution, a fix takes its share off both, and a burn adds
+what it did differently from the command.
 
 R. E. Kalman, Journal of Basic Engineering 82 (1960) 35-45; G. W. Hill, American Journal of Mathematics 1 (1878) 5-26.
 """
@@ -67,27 +67,18 @@ def propagated(e, t, noise):
 
 @physics
 def first_measured(e, error, variance):
-    """The estimate [m, m/s] after a measurement of its first component with this error.
+    """The estimate after a measurement of its first component with this error; Kalman (1960), scalar update.
 
-    Kalman (1960), scalar update.
+    Its components are in the order s, u, w, r, so that the next measurement is that of the second.
     """
     inverse = 1.0 / (e.prr + variance)
     kr, ks, ku, kw = e.prr * inverse, e.prs * inverse, e.pru * inverse, e.prw * inverse
     news = error - e.r
     return Estimate(
-        r=e.r + kr * news, s=e.s + ks * news, u=e.u + ku * news, w=e.w + kw * news,
-        prr=variance * kr, prs=variance * ks, pru=variance * ku, prw=variance * kw,
-        pss=e.pss - ks * e.prs, psu=e.psu - ks * e.pru, psw=e.psw - ks * e.prw,
-        puu=e.puu - ku * e.pru, puw=e.puw - ku * e.prw, pww=e.pww - kw * e.prw,
-    )  # fmt: skip
-
-
-@physics
-def rotated(e):
-    """The same estimate with its components in the order s, u, w, r."""
-    return Estimate(
-        r=e.s, s=e.u, u=e.w, w=e.r, prr=e.pss, prs=e.psu, pru=e.psw, prw=e.prs, pss=e.puu, psu=e.puw, psw=e.pru,
-        puu=e.pww, puw=e.prw, pww=e.prr,
+        r=e.s + ks * news, s=e.u + ku * news, u=e.w + kw * news, w=e.r + kr * news,
+        prr=e.pss - ks * e.prs, prs=e.psu - ks * e.pru, pru=e.psw - ks * e.prw, prw=variance * ks,
+        pss=e.puu - ku * e.pru, psu=e.puw - ku * e.prw, psw=variance * ku,
+        puu=e.pww - kw * e.prw, puw=variance * kw, pww=variance * kr,
     )  # fmt: skip
 
 
@@ -95,10 +86,8 @@ def rotated(e):
 def fixed(e, fix, place, velocity):
     """The estimate after a fix with this Error, of 1-sigma `place` [m] and `velocity` [m/s] along each axis."""
     place2, velocity2 = place * place, velocity * velocity
-    e = rotated(first_measured(e, fix.r, place2))
-    e = rotated(first_measured(e, fix.s, place2))
-    e = rotated(first_measured(e, fix.u, velocity2))
-    return rotated(first_measured(e, fix.w, velocity2))
+    e = first_measured(first_measured(e, fix.r, place2), fix.s, place2)
+    return first_measured(first_measured(e, fix.u, velocity2), fix.w, velocity2)
 
 
 @physics
@@ -117,36 +106,32 @@ def fix_error(draws, first, p):
 
 
 @physics
-def burnt(e, outward, ahead, dv, thrust_sigma, pointing_sigma):
-    """The estimate after a burn of dv [m/s] that gave so much more than commanded outward and ahead [m/s]."""
-    a, b = pointing_sigma * dv, thrust_sigma * dv
-    return replace(e, u=e.u - outward, w=e.w - ahead, puu=e.puu + a * a, pww=e.pww + b * b)
+def burnt(e, burn, o):
+    """The estimate [m, m/s] after a Burn: less what it gave over its command, uncertain as burns are assumed to be."""
+    size = abs(burn.dv)
+    outward, ahead = size * burn.outward / o.thrust, size * burn.ahead / o.thrust
+    a, b = o.assumed_pointing * size, o.assumed_thrust * size
+    return replace(e, u=e.u - outward, w=e.w - (ahead - burn.dv), puu=e.puu + a * a, pww=e.pww + b * b)
 
 
 @physics
 def control(t, m, p, o, draws):
-    """A fix [m, m/s], if there are any, and what a burn before the next needs.
-
-    That is fresh deviates for the burn's errors, and the single fix that follows it.
-    """
+    """A fix [m, m/s], if there are any; fresh deviates for a burn before the next, and the single fix after it."""
     fix = fix_error(draws, 0, p)
     d1, d2 = normal_pair(draws, 2)
     d3, _ = normal_pair(draws, 3)
-    place, velocity, e = p.nav_position, p.nav_velocity, m.estimate
-    if o.navigation == CHOICES.navigation.raw:
-        e = single_fix(fix, place, velocity)
-    elif o.navigation == CHOICES.navigation.filtered:
-        going = propagated(e, o.fix_period, o.filter_noise * o.fix_period)
-        e = where(t > 0.0, fixed(going, fix, place, velocity), single_fix(fix, place, velocity))
+    e = m.estimate
+    if o.navigation != CHOICES.navigation.perfect:
+        e = single_fix(fix, p.nav_position, p.nav_velocity)
+    if o.navigation == CHOICES.navigation.filtered:
+        going = propagated(m.estimate, o.fix_period, o.filter_noise * o.fix_period)
+        e = where(t > 0.0, fixed(going, fix, p.nav_position, p.nav_velocity), e)
     return replace(m, estimate=e, after=fix_error(draws, 4, p), d1=d1, d2=d2, d3=d3)
 
 
 @physics
 def navigated_elements(s, e):
-    """Equinoctial elements of the module as navigation measures them: e.r, e.s [m] and e.u, e.w [m/s] are its errors.
-
-    r, u : outward;  s, w : ahead.
-    """
+    """Equinoctial elements of the module as navigation measures them with the error e, an `Error` or `Estimate`."""
     true_v = Vector(s.vx, s.vy, s.vz)
     axes = ric_from_eci(s, true_v)
     outward, ahead = Vector(axes.xx, axes.xy, axes.xz), Vector(axes.yx, axes.yy, axes.yz)

@@ -1,8 +1,6 @@
 """The phasing plan: the source's corrections, or designed ones, with the gains that answer deviations.
 
-Design: corrections and coasts of the drift model that leave the least cost, then the flight with finite burns in the
-full dynamics tells what the model lacks at the end, and so on; two or three passes settle.  NumPy and SciPy, once for
-all cases of the same settings.
+NumPy and SciPy, once for all cases of the same settings.
 """
 
 from collections import namedtuple
@@ -12,7 +10,6 @@ import numpy as np
 import scipy  # loads its packages when they are used
 
 from campaigns.geo_servicing import drift_model
-from campaigns.geo_servicing.drift_model import DRIFT_PER_DV, after_correction
 from campaigns.geo_servicing.dynamics import SIDEREAL_DAY
 from campaigns.geo_servicing.inputs import CHOICES
 from campaigns.geo_servicing.plan_table import Row, plan_rows
@@ -34,18 +31,16 @@ Limits = namedtuple("Limits", "y v e coasts longest last")
 
 
 def plan_of(o: Any, first: Any) -> np.ndarray:
-    """The table of the plan (see `plan_table`); o, first : see `Craft`."""
+    """The table of the plan (see `plan_table`), SI; o, first : see `Craft`."""
     craft = Craft(o, first)
-    plan = published_plan(craft) if o.schedule == CHOICES.schedule.published else design(craft)
+    if o.schedule == CHOICES.schedule.published:
+        coasts, burns, signs = np.transpose(PUBLISHED)
+        plan = Plan(coasts, signs * craft.velocity_changes(burns))
+    else:
+        plan = design(craft)
     (ignition, longitude, drift), _ = craft.fly_plan(plan)
     _, gains, _ = feedback(craft, plan, limits_of(o))
     return plan_rows(Row(ignition, plan.dv, longitude, drift, *gains.T))
-
-
-def published_plan(craft: Craft) -> Plan:
-    """The source's corrections as velocity changes [m/s] of this craft."""
-    coasts, burns, signs = (np.array(column) for column in zip(*PUBLISHED, strict=True))
-    return Plan(coasts, signs * craft.velocity_changes(burns))
 
 
 def middles(craft: Craft, plan: Plan) -> tuple[np.ndarray, float]:
@@ -63,12 +58,12 @@ def modelled(craft: Craft, plan: Plan, lacking: End) -> End:
     along the radius.
     """
     when, end = middles(craft, plan)
-    y, v = after_correction(craft.y, craft.v, 0.0, when[0], *craft.pull)
+    y, v = drift_model.after_correction(craft.y, craft.v, 0.0, when[0], *craft.pull)
     e = craft.e
     check = end + 0.5  # the longitude that counts is the mean of the day after
     for dv, now, following in zip(plan.dv, when, [*when[1:], check], strict=True):
         e = e + drift_model.E_PER_DV * dv * np.exp(1j * (craft.aim + TURN * now + y))
-        y, v = after_correction(y, v, DRIFT_PER_DV * dv, following - now, *craft.pull)
+        y, v = drift_model.after_correction(y, v, drift_model.DRIFT_PER_DV * dv, following - now, *craft.pull)
     # what the drift will be is that of the longitude, which the outward pull joins
     return End(y + lacking.y, v + craft.pull[1] + lacking.v, e + lacking.e, end)
 
@@ -90,8 +85,9 @@ def feedback(craft: Craft, plan: Plan, limits: Limits) -> tuple[np.ndarray, np.n
 def design(craft: Craft) -> Plan:
     """Corrections and coasts that end at the place, with the drift asked for and a small eccentricity.
 
-    The source's successive approximations: the plan of the drift model is flown in the full dynamics, and what the
-    model lacks at the end is added to the next plan's aim.  Coasts [s], corrections [m/s].
+    The source's successive approximations: the plan of the drift model that costs least is flown with finite burns in
+    the full dynamics, and what the model lacks at the end is added to the next plan's aim; two or three passes settle.
+    Coasts [s], corrections [m/s].
     """
     limits, lacking = limits_of(craft.o), End(0.0, 0.0, 0.0, 0.0)
     starts = first_approximations(craft, limits)
@@ -116,7 +112,7 @@ def first_approximations(craft: Craft, limits: Limits) -> list[Plan]:
         shortest = limits.coasts.copy()
         shortest[1:] += longer
         u, t = profile(craft.y, craft.v, limits.last, shortest)
-        dv = u / DRIFT_PER_DV
+        dv = u / drift_model.DRIFT_PER_DV
         burns = craft.burn_times(dv)
         coasts = t * SIDEREAL_DAY - 0.5 * (burns + np.concatenate([[0.0], burns[:-1]]))
         plans.append(Plan(np.maximum(coasts, shortest * SIDEREAL_DAY), dv))
@@ -145,7 +141,7 @@ def _improved(craft: Craft, limits: Limits, lacking: End, start: Plan) -> tuple[
         """Speed change [m/s] with the spread's share in it; where time is the aim, the time [rev] and 0.02 of that."""
         candidate = plan(z)
         b, _, costs = feedback(craft, candidate, limits)
-        spread = drift_model.planned_cost(b, costs, DRIFT_PER_DV * candidate.dv, craft.o.assumed_thrust)
+        spread = drift_model.planned_cost(b, costs, drift_model.DRIFT_PER_DV * candidate.dv, craft.o.assumed_thrust)
         spent = (signs * candidate.dv).sum() + DV_OF_COST * spread
         return modelled(craft, candidate, lacking).time + 0.02 * spent if craft.o.aim == CHOICES.aim.time else spent
 
@@ -159,8 +155,7 @@ def _improved(craft: Craft, limits: Limits, lacking: End, start: Plan) -> tuple[
         end = modelled(craft, plan(z), lacking)
         return np.array([1.0 - abs(end.e) ** 2 / (E_PLANNED * limits.e) ** 2, limits.longest - end.time])
 
-    largest = np.full(n, 20.0)
-    largest[-1] = abs(limits.last / DRIFT_PER_DV)
+    largest = np.append(np.full(n - 1, 20.0), abs(limits.last / drift_model.DRIFT_PER_DV))
     bounds = [(low, limits.longest) for low in limits.coasts]
     bounds += [(0.0, size) if sign > 0.0 else (-size, 0.0) for sign, size in zip(signs, largest, strict=True)]
     conditions = ({"type": "eq", "fun": equal}, {"type": "ineq", "fun": inside})

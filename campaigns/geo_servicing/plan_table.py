@@ -1,7 +1,4 @@
-"""Layout of a phasing plan in the tables of the model: the number of corrections, then a row for each.
-
-The rows of the gravity harmonics follow.
-"""
+"""Layout of a phasing plan in the model's tables: number of corrections, a row for each; the harmonics follow."""
 
 from collections import namedtuple
 

@@ -17,9 +17,6 @@ from mc_engine.physics.gravity import point_mass
 from mc_engine.physics.sun_moon import ephemeris
 from mc_engine.physics.vectors import Vector, subtracted
 
-_TOLERANCES = {"rtol": 1e-9, "atol": dynamics.tolerances(1e-3, 1e-7)}
-
-
 Plan = namedtuple("Plan", "coasts dv")  # before the corrections [s], and their velocity changes [m/s], float64[n]
 # end of a flown plan, or a difference of two: mean longitude deviation of the sidereal day after [rad], actual drift in
 # it [rad/rev], osculating eccentricity vector x + i y at the last cut-off, and the time of that [rev]
@@ -27,10 +24,12 @@ End = namedtuple("End", "y v e time")
 
 
 class Craft:
-    """The servicing module at the start, without errors."""
+    """The servicing module at the start, without errors.
+
+    o : settings, with all tables of the model and room for the plan;  first : kernel parameters, SI
+    """
 
     def __init__(self, o: Any, first: Any):
-        """o : settings, with all tables of the model and room for the plan;  first : kernel parameters, SI."""
         self.o, self.p, self.aim = o, first, first.aim
         self.start = np.array(dynamics.initial(first))
         self.y, self.v, self.e = self.seen(0.0, self.start)
@@ -71,8 +70,8 @@ class Craft:
         def rates(time, y):
             return dynamics.rhs(time, State(*y), m, self.p, self.o)
 
-        flight = scipy.integrate.solve_ivp(rates, (t, t + length), s, "DOP853", **_TOLERANCES)
-        return np.asarray(flight.y[:, -1])
+        tolerances = {"rtol": 1e-9, "atol": dynamics.tolerances(1e-3, 1e-7)}
+        return np.asarray(scipy.integrate.solve_ivp(rates, (t, t + length), s, "DOP853", **tolerances).y[:, -1])
 
     def fly_plan(self, plan: Plan) -> tuple[np.ndarray, End]:
         """(time [s], mean longitude deviation [rad] and osculating drift [rad/rev] at the ignitions, [3, n]; end)."""

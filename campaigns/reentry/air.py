@@ -11,11 +11,10 @@ HEAT_RATIO = 1.4
 
 # Slow density uncertainty, of the class of the Global Reference Atmosphere Models (Leslie, Justus,
 # NASA/TM-2011-216467): three sigma in five bands of altitude.  Log-normal, so that +3 sigma is exactly the share
-# below; linear between the middles of the bands, so that the density has no steps.
-SLOW_BANDS = ((15e3, 0.10), (45e3, 0.15), (70e3, 0.30), (90e3, 0.45), (110e3, 0.60))
-_BASE = tuple(h for h, _ in SLOW_BANDS)
-_SIGMA = tuple(math.log1p(share) / 3.0 for _, share in SLOW_BANDS)
-_SLOPE = tuple((_SIGMA[i + 1] - _SIGMA[i]) / (_BASE[i + 1] - _BASE[i]) for i in range(len(_BASE) - 1))
+# below; linear between the middles of the bands, so that the density has no steps, and constant above the last.
+_BASE = (15e3, 45e3, 70e3, 90e3, 110e3)
+_SIGMA = tuple(math.log1p(share) / 3.0 for share in (0.10, 0.15, 0.30, 0.45, 0.60))
+_SLOPE = (*((_SIGMA[i + 1] - _SIGMA[i]) / (_BASE[i + 1] - _BASE[i]) for i in range(4)), 0.0)
 
 
 @physics
@@ -26,8 +25,7 @@ def slow_sigma(h):
         inside = h >= _BASE[i]
         base, sigma = where(inside, _BASE[i], base), where(inside, _SIGMA[i], sigma)
         slope = where(inside, _SLOPE[i], slope)
-    top = h >= _BASE[-1]
-    return where(top, _SIGMA[-1], sigma + slope * (h - base)), where(top, 0.0, slope)
+    return sigma + slope * (h - base), slope
 
 
 @physics

@@ -15,10 +15,7 @@ _ITEMS = [item for item in Inputs.declared if item.symbol in Vehicle._fields]
 
 
 def airframe_of(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> Vehicle:
-    """Each case's vehicle as planned, without factors; in SI.
-
-    One that is named and given other numbers besides is refused.
-    """
+    """Each case's vehicle without factors, SI; one that is named and given other numbers besides is refused."""
     numbers = {item.symbol: getattr(i, item.symbol) for item in _ITEMS}
     for code, (name, vehicle) in enumerate(VEHICLES.items(), start=1):
         chosen = settings.vehicle == code
@@ -32,10 +29,7 @@ def airframe_of(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusal
 
 
 def airframe_rows(i: SimpleNamespace, settings: SimpleNamespace, airframe: Vehicle) -> dict[str, np.ndarray]:
-    """Areas over mass [m^2/kg] of the forces in hypersonic flow, dispersions included; coefficient of the heating.
-
-    Besides them the numbers of the vehicle, by symbol, and angles by cosine and sine.
-    """
+    """Areas over mass [m^2/kg] of the forces in hypersonic flow, with factors; heating, angles, vehicle's numbers."""
     drag = airframe.drag_coefficient * i.cd_factor
     lift = airframe.lift_coefficient * i.cd_factor * i.ld_factor
     trim, tilted = airframe.trim_angle, airframe.trim_angle + i.accelerometer_misalignment

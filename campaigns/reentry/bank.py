@@ -50,6 +50,6 @@ def side_of(side, miss, speed, p):
 
     The band falls with the square of the speed, as does what is left of the lateral reach: R. Morth, R-532 (1966).
     """
-    share = speed * (1.0 / p.speed)
+    share = speed * (1.0 / p.relative_speed)
     band = p.reversal_floor + p.reversal_width * share * share
     return where(miss > band, -1.0, where(miss < -band, 1.0, side))

@@ -1,8 +1,8 @@
 """Flight of an entering vehicle: a point mass with drag and banked lift about a turning planet.
 
 Planet-fixed Cartesian axes (x to longitude 0, z to the north pole), SI.  The motion is that of Vinh's equations
-(`vinh.py`), in components that have no singularity: a vehicle may start at rest, fall vertically, and pass over a pole.
-On a flat Earth x points ahead, y to the left and z up.
+(`guidance/reference.py`), in components that have no singularity: a vehicle may start at rest, fall vertically, and
+pass over a pole.  On a flat Earth x points ahead, y to the left and z up.
 """
 
 from collections import namedtuple
@@ -45,8 +45,7 @@ Steering = namedtuple(
 )
 # time of the last sample, bank [rad] and its rate there and at the next
 Turn = namedtuple("Turn", "sampled bank bank_rate next_bank next_rate", defaults=(0.0, 0.0, 0.0, 0.0, 0.0))
-# what law 3 keeps: speed lost W, reckoned range, present rate of it, measured deceleration, its logarithm over the
-# stored one
+# what law 3 keeps: speed lost W, reckoned range and its rate, measured deceleration, its logarithm over the stored one
 Reckoning = namedtuple("Reckoning", "lost range rate axial excess", defaults=(0.0, 0.0, 0.0, 0.0, 0.0))
 Events = namedtuple("Events", "pressure_peak heat_peak pull_out roll leave stop left over")
 Place = namedtuple("Place", "altitude climb up")  # climb: rate of the altitude; up: unit vector
@@ -85,18 +84,16 @@ def place_of(s, p, o):
     The altitude changes like r less the ellipsoid's radius: r' - (dR/d sin^2) (sin^2)', derived here with sin = z / r.
     """
     if o.shape == CHOICES.shape.flat:
-        place = Place(altitude=s.z, climb=s.vz, up=Vector(0.0, 0.0, 1.0))
-    else:
-        r2 = dot(s, s)
-        inverse2 = 1.0 / r2
-        r = sqrt(r2)
-        inverse = r * inverse2
-        altitude, slope = over_ellipsoid(r, inverse, s.z * s.z * inverse2, p.polar_radius, p.e2)
-        radial = dot(s, velocity(s)) * inverse
-        # rate of the squared sine of latitude, z^2 / r^2
-        climb = radial - slope * (2.0 * s.z * inverse2 * (s.vz - s.z * radial * inverse))
-        place = Place(altitude, climb, up=scaled(inverse, s))
-    return place
+        return Place(altitude=s.z, climb=s.vz, up=Vector(0.0, 0.0, 1.0))
+    r2 = dot(s, s)
+    inverse2 = 1.0 / r2
+    r = sqrt(r2)
+    inverse = r * inverse2
+    altitude, slope = over_ellipsoid(r, inverse, s.z * s.z * inverse2, p.polar_radius, p.e2)
+    radial = dot(s, velocity(s)) * inverse
+    # rate of the squared sine of latitude, z^2 / r^2
+    climb = radial - slope * (2.0 * s.z * inverse2 * (s.vz - s.z * radial * inverse))
+    return Place(altitude, climb, up=scaled(inverse, s))
 
 
 @physics
@@ -122,16 +119,15 @@ def air_of(s, place, p, o):
 @physics
 def force_of(air, p, o):
     """Areas over mass [m^2/kg] in the flow about the craft; by the Mach number if the vehicle has curves over it."""
-    force = Force(p.drag, p.lift, p.total, p.axial, p.sensed)
-    if o.vehicle == CHOICES.vehicle.apollo:
-        of_drag, of_lift = apollo_shares(air.speed / sound_speed(air.temperature))
-        drag, lift = of_drag * p.drag, of_lift * p.lift
-        force = Force(
-            drag, lift, total=sqrt(drag * drag + lift * lift),
-            axial=axial_coefficient(drag, lift, p.cos_trim, p.sin_trim),
-            sensed=axial_coefficient(drag, lift, p.cos_tilted, p.sin_tilted),
-        )  # fmt: skip
-    return force
+    if o.vehicle != CHOICES.vehicle.apollo:
+        return merged(Force, p)
+    of_drag, of_lift = apollo_shares(air.speed / sound_speed(air.temperature))
+    drag, lift = of_drag * p.drag, of_lift * p.lift
+    return Force(
+        drag, lift, total=sqrt(drag * drag + lift * lift),
+        axial=axial_coefficient(drag, lift, p.cos_trim, p.sin_trim),
+        sensed=axial_coefficient(drag, lift, p.cos_tilted, p.sin_tilted),
+    )  # fmt: skip
 
 
 @physics
@@ -157,19 +153,16 @@ def field(s, p, o):
         g = Vector(*point_mass(s.x, s.y, s.z, p.mu))
     if o.gravity == CHOICES.gravity.j2:
         g = added(g, Vector(*j2_perturbation(s.x, s.y, s.z, p.mu)))
-    centrifugal = p.rate * p.rate
-    return Vector(g.x + centrifugal * s.x, g.y + centrifugal * s.y, g.z)
+    return Vector(g.x + p.rate * p.rate * s.x, g.y + p.rate * p.rate * s.y, g.z)
 
 
 @physics
 def bank_of(t, m, o):
     """(cosine, sine) of the bank angle [rad]; the sine is 0 in a planar flight."""
     if o.guidance == CHOICES.guidance.none:
-        cosine, sine = m.met.lift.cos_bank, m.met.lift.sin_bank
-    else:
-        sine, cosine = sincos(angle_at(t, m.steering.turn, o.guidance_period))
-        sine = (1.0 - o.planar) * sine
-    return cosine, sine
+        return m.met.lift.cos_bank, m.met.lift.sin_bank
+    sine, cosine = sincos(angle_at(t, m.steering.turn, o.guidance_period))
+    return cosine, (1.0 - o.planar) * sine
 
 
 @physics
@@ -221,9 +214,8 @@ def crossings(t, s, m, p, o):
 @physics
 def moment_of(t, s, exposure):
     """The `Moment` of a state and its `Exposure`, SI."""
-    load = exposure.dynamic_pressure * exposure.force.total
-    axial_load = exposure.dynamic_pressure * exposure.force.axial
-    speed = norm(velocity(s))
+    pressure, force, speed = exposure.dynamic_pressure, exposure.force, norm(velocity(s))
+    load, axial_load = pressure * force.total, pressure * force.axial
     return merged(Moment, exposure, exposure.place, time=t, speed=speed, load=load, axial_load=axial_load)
 
 
@@ -238,23 +230,18 @@ def start(p, o):
 
 @physics
 def exit_of(t, s, p, o):
-    """The `Exit` of a vehicle that leaves the atmosphere, SI.
-
-    The apoapsis is that of a point mass; on a hyperbola, and over a flat Earth, it is not a number.
-    """
+    """The `Exit`, SI; the apoapsis, about a point mass, is not a number on a hyperbola and over a flat Earth."""
     v = norm(velocity(s))
     if o.shape == CHOICES.shape.flat:
-        angle, inertial, apoapsis = atan2(s.vz, sqrt(s.vx * s.vx + s.vy * s.vy)), v, NAN
-    else:
-        angle = velocity_angles(s.x, s.y, s.z, s.vx, s.vy, s.vz)[0]
-        w = Vector(s.vx - p.rate * s.y, s.vy + p.rate * s.x, s.vz)
-        h = cross(s, w)
-        inverse_a = 2.0 / norm(s) - dot(w, w) / p.mu
-        bound = inverse_a > 0.0
-        a = 1.0 / where(bound, inverse_a, 1.0)
-        e2 = maximum(1.0 - dot(h, h) / (p.mu * a), 0.0)
-        inertial, apoapsis = norm(w), where(bound, a * (1.0 + sqrt(e2)) - p.radius, NAN)
-    return Exit(t, v, angle, inertial, apoapsis)
+        return Exit(t, v, atan2(s.vz, sqrt(s.vx * s.vx + s.vy * s.vy)), v, NAN)
+    angle, _ = velocity_angles(s.x, s.y, s.z, s.vx, s.vy, s.vz)
+    w = Vector(s.vx - p.rate * s.y, s.vy + p.rate * s.x, s.vz)
+    h = cross(s, w)
+    inverse_a = 2.0 / norm(s) - dot(w, w) / p.mu
+    bound = inverse_a > 0.0
+    a = 1.0 / where(bound, inverse_a, 1.0)
+    e2 = maximum(1.0 - dot(h, h) / (p.mu * a), 0.0)
+    return Exit(t, v, angle, norm(w), where(bound, a * (1.0 + sqrt(e2)) - p.radius, NAN))
 
 
 @physics

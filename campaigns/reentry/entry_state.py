@@ -9,14 +9,7 @@ from campaigns.reentry.air import GAS_CONSTANT
 from campaigns.reentry.inputs import CHOICES
 from campaigns.reentry.planets import of_planets
 from mc_engine.model import Refusals
-from mc_engine.physics.frames import (
-    carried_along,
-    local_axes,
-    over_ellipsoid,
-    radius_at_altitude,
-    turned,
-    velocity_components,
-)
+from mc_engine.physics import frames
 
 # The planet of each case and its exponential atmosphere; float64[n], SI.  gravity: at the ground
 World = namedtuple("World", "mu radius polar_radius e2 rate gravity log_density inverse_scale temperature")
@@ -29,10 +22,7 @@ Planned = namedtuple("Planned", "place ahead right altitude r latitude speed pat
 
 
 def world_of(i: SimpleNamespace, settings: SimpleNamespace) -> World:
-    """The planet of each case as its settings ask for it, SI; one without an ellipsoid is its sphere.
-
-    The temperature [K] is that of the exponential atmosphere, g H0 / R.
-    """
+    """The planet of each case as its settings ask for it, SI; temperature: of the exponential atmosphere, g H0 / R."""
     radius = np.where(i.surface_radius > 0.0, i.surface_radius, of_planets(settings.planet, "radius"))
     e2 = np.where(settings.shape == CHOICES.shape.ellipsoid, of_planets(settings.planet, "e2"), 0.0)
     mu = of_planets(settings.planet, "mu")
@@ -52,61 +42,49 @@ def world_of(i: SimpleNamespace, settings: SimpleNamespace) -> World:
 
 
 def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusals: Refusals) -> Entry:
-    """The first state with its errors, SI, and the entry that was planned without them."""
+    """The first state with its errors, and the entry planned without them, given by its altitude or radius; SI."""
 
     def over_ground(speed, path, heading, radius, latitude):
         """North, east, up, size [m/s] and path angle [rad] of the velocity over ground, from those in speed_frame."""
         inertial = settings.speed_frame == CHOICES.speed_frame.inertial
-        carried = np.where(inertial, carried_along(radius, latitude, world.rate), 0.0)
-        north, east, up = velocity_components(speed, path, heading) - carried
+        carried = np.where(inertial, frames.carried_along(radius, latitude, world.rate), 0.0)
+        north, east, up = frames.velocity_components(speed, path, heading) - carried
         return north, east, up, np.sqrt(north**2 + east**2 + up**2), np.arctan2(up, np.hypot(north, east))
 
-    radius, altitude = _height(i, world)
-    speed, path = _arrival(i, settings, world, radius, refusals)
+    radius = frames.radius_at_altitude(i.entry_altitude, i.entry_latitude, world.polar_radius, world.e2)
+    radius = np.where(i.entry_radius > 0.0, i.entry_radius, radius)
+    sin2 = np.sin(i.entry_latitude) ** 2
+    altitude, _ = frames.over_ellipsoid(radius, 1.0 / radius, sin2, world.polar_radius, world.e2)
+    altitude = np.where(i.entry_radius > 0.0, altitude, i.entry_altitude)
+    in_frame, path_in_frame = _arrival(i, settings, world, radius, refusals)
     latitude, longitude = i.entry_latitude, i.entry_longitude
-    north, east, _, flown_speed, flown_path = over_ground(speed, path, i.entry_heading, radius, latitude)
+    north, east, _, speed, path = over_ground(in_frame, path_in_frame, i.entry_heading, radius, latitude)
     heading = np.where(np.hypot(north, east) > 0.0, np.arctan2(east, north), i.entry_heading)
-    to_north, to_east, place = local_axes(latitude, longitude)
-    ahead = np.cos(heading) * to_north + np.sin(heading) * to_east
-    planned = Planned(
-        place=place,
-        ahead=ahead,
-        right=np.cross(ahead, place, axis=0),
-        altitude=altitude,
-        r=radius,
-        latitude=latitude,
-        speed=flown_speed,
-        path=flown_path,
-        heading=heading,
-    )
-    speed, path = speed + i.entry_speed_error, path + i.entry_flight_path_angle_error
+    cosine, sine = np.cos(heading), np.sin(heading)
+    to_north, to_east, place = frames.local_axes(latitude, longitude)
+    ahead = cosine * to_north + sine * to_east
+    right = np.cross(ahead, place, axis=0)
+    planned = Planned(place, ahead, right, altitude, radius, latitude, speed, path, heading)
+    # the same with its errors
     latitude, longitude = latitude + i.entry_latitude_error, longitude + i.entry_longitude_error
     radius = radius + i.entry_altitude_error
+    in_frame, path_in_frame = in_frame + i.entry_speed_error, path_in_frame + i.entry_flight_path_angle_error
     heading_in_frame = i.entry_heading + i.entry_heading_error
-    north, east, up, speed, path = over_ground(speed, path, heading_in_frame, radius, latitude)
-    to_north, to_east, place = local_axes(latitude, longitude)
+    north, east, up, speed, path = over_ground(in_frame, path_in_frame, heading_in_frame, radius, latitude)
+    to_north, to_east, place = frames.local_axes(latitude, longitude)
     flat, zero = settings.shape == CHOICES.shape.flat, np.zeros_like(radius)
-    flat_ahead, flat_right = turned(north, east, np.cos(heading), np.sin(heading))
+    flat_ahead, flat_right = frames.turned(north, east, cosine, sine)
     # minus zero would fly to other bits than zero does
     position = np.where(flat, [zero, zero, radius - world.polar_radius], radius * place) + 0.0
     velocity = np.where(flat, [flat_ahead, -flat_right, up], north * to_north + east * to_east + up * place) + 0.0
     return Entry(position, velocity, speed, path, planned)
 
 
-def _height(i: SimpleNamespace, world: World):
-    """(radius, geodetic altitude) [m] of the planned entry, one of which is given."""
-    radius = radius_at_altitude(i.entry_altitude, i.entry_latitude, world.polar_radius, world.e2)
-    radius = np.where(i.entry_radius > 0.0, i.entry_radius, radius)
-    altitude = over_ellipsoid(radius, 1.0 / radius, np.sin(i.entry_latitude) ** 2, world.polar_radius, world.e2)[0]
-    return radius, np.where(i.entry_radius > 0.0, altitude, i.entry_altitude)
-
-
 def _arrival(i: SimpleNamespace, settings: SimpleNamespace, world: World, radius: np.ndarray, refusals: Refusals):
     """(speed, flight-path angle) of the planned entry in the frame speed_frame: those given, or of a hyperbola.
 
-    Its energy and angular momentum are those of the excess speed and of the vacuum periapsis, which lies below the
-    radius or the case joins `refusals`.  Speed [m/s], angle [rad]; derived here from their
-    conservation on the hyperbola.
+    Speed [m/s], angle [rad]; derived here from the conservation of energy and angular momentum, which are those of the
+    excess speed and of the vacuum periapsis.  That lies below the radius, or the case joins `refusals`.
     """
     comes = settings.arrival == CHOICES.arrival.hyperbola
     periapsis = world.radius + i.vacuum_periapsis

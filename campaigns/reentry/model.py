@@ -16,10 +16,6 @@ from campaigns.reentry.inputs import CHOICES, Inputs
 from mc_engine.model import AdaptiveStep, Event, Refusals, declared_in, figures, model, prepared
 from mc_engine.studies.published import read_published
 
-SOURCE = (
-    "N. Mahmoudian, Design of a re-entry guidance and control system based on nominal-trajectory tracking "
-    "(in Persian), M.Sc. thesis, K. N. Toosi University of Technology, early 2000s"
-)
 FIRST = 1  # index at which the tables of the cases begin
 
 
@@ -35,16 +31,15 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
     plan = plans_of(inputs, settings, world, planned, airframe)
     guided = settings.guidance != CHOICES.guidance.none
     refusals.add(guided & ~(plan.lift_to_drag > 0.0), "a guidance law needs a vehicle with lift")
-    references = stored_references(plan, guided, FIRST, refusals)
+    start, along, tables = stored_references(plan, guided, FIRST, refusals)
     rows = vars(inputs) | world._asdict() | _axes("", entry.position) | _axes("v", entry.velocity)
-    rows |= {"exit": np.where(inputs.exit_altitude > 0.0, inputs.exit_altitude, altitude)}
-    rows |= {"speed": entry.speed, "path": entry.path}  # over ground, errors included; the heading is the planned one
     # the numbers of a vehicle that is named take the place of the inputs
     rows |= airframe_rows(inputs, settings, airframe) | _bank_rows(inputs, settings)
-    rows |= _target(inputs, world, planned, np.where(guided, references.range, inputs.target_downrange))
-    rows |= {"reference": references.start, "planned_range": references.range, "planned_share": plan.share}
-    rows |= {"planned_lift_to_drag": plan.lift_to_drag}
-    return rows | _case_tables(inputs, settings, references.tables)
+    rows |= _target(inputs, world, planned, np.where(guided, along, inputs.target_downrange))
+    rows |= {"exit": np.where(inputs.exit_altitude > 0.0, inputs.exit_altitude, altitude), "heading": planned.heading}
+    rows |= {"relative_speed": entry.speed, "relative_flight_path_angle": entry.path}  # with their errors
+    rows |= {"planned_range": along, "planned_share": plan.share, "planned_lift_to_drag": plan.lift_to_drag}
+    return rows | {"reference": start} | _case_tables(inputs, settings, tables)
 
 
 def _axes(letters: str, vectors: np.ndarray) -> dict[str, np.ndarray]:
@@ -57,22 +52,19 @@ def _refuse_what_does_not_fit(settings: SimpleNamespace, refusals: Refusals) -> 
     other, flat = settings.planet != CHOICES.planet.earth, settings.shape == CHOICES.shape.flat
     weather, j2 = settings.weather > 0.5, settings.gravity == CHOICES.gravity.j2
     by_air = settings.heating == CHOICES.heating.detra_kemp_riddell
-    for mask, sentence in (
-        (other & (settings.atmosphere == CHOICES.atmosphere.us76), 'the atmosphere "us76" is that of the Earth'),
-        (other & j2, 'the gravity "j2" is that of the Earth; take "point"'),
-        (other & weather, "the random air of weather = true is that of the Earth"),
-        (other & by_air, 'the heating "detra_kemp_riddell" is that of the Earth\'s air'),
-        (flat & weather, "a flat Earth has no weather"),
-        (flat & (settings.guidance != CHOICES.guidance.none), "the guidance laws want a round planet"),
-        (flat & (settings.rotating > 0.5), "a flat Earth does not turn; set rotating = false"),
-        (flat & j2, 'a flat Earth has the gravity "point", which is uniform, or "none"'),
-    ):
-        refusals.add(mask, sentence)
+    us76 = settings.atmosphere == CHOICES.atmosphere.us76
+    refusals.add(other & us76, 'the atmosphere "us76" is that of the Earth')
+    refusals.add(other & j2, 'the gravity "j2" is that of the Earth; take "point"')
+    refusals.add(other & weather, "the random air of weather = true is that of the Earth")
+    refusals.add(other & by_air, 'the heating "detra_kemp_riddell" is that of the Earth\'s air')
+    refusals.add(flat & weather, "a flat Earth has no weather")
+    refusals.add(flat & (settings.guidance != CHOICES.guidance.none), "the guidance laws want a round planet")
+    refusals.add(flat & (settings.rotating > 0.5), "a flat Earth does not turn; set rotating = false")
+    refusals.add(flat & j2, 'a flat Earth has the gravity "point", which is uniform, or "none"')
 
 
 def _bank_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, np.ndarray]:
-    """Directions of the lift by cosine and sine of the bank; a planar flight has no side.  When to roll.
-    first_bank [rad], the rest have no unit.
+    """The first bank [rad], cosines and sines of all, without a side in a planar flight, and when to roll.
 
     roll_at, roll_back_at : sines of the flight-path angles; 2 and -2, which no sine reaches, stand for "never"
     """
@@ -97,7 +89,7 @@ def _target(i: SimpleNamespace, world: World, planned: Planned, end: np.ndarray)
     ahead = np.cos(along) * planned.place + np.sin(along) * planned.ahead
     target = np.cos(across) * ahead + np.sin(across) * planned.right
     rows = _axes("e", planned.place) | _axes("f", planned.ahead) | _axes("n", planned.right) | _axes("t", target)
-    return rows | {"heading": planned.heading, "aim_down": downrange, "aimed": np.where(downrange > 0.0, 1.0, 0.0)}
+    return rows | {"aim_down": downrange}
 
 
 def _case_tables(i: SimpleNamespace, settings: SimpleNamespace, references: np.ndarray) -> dict[str, np.ndarray]:
@@ -110,7 +102,6 @@ def _case_tables(i: SimpleNamespace, settings: SimpleNamespace, references: np.n
     return {"weather": start, "tables": np.concatenate([references, nodes.ravel()])}
 
 
-HIGHEST_LANDING_KM = 35.0  # a flight that ends higher has left the atmosphere again, or ran out of time
 CORRIDOR = ("peak_load_g", "peak_axial_load_g", "peak_dynamic_pressure_pa", "peak_heat_rate_w_m2", "heat_load_j_m2")
 # a map is drawn where the run disperses its two inputs
 FIGURES = (
@@ -124,17 +115,14 @@ FIGURES = (
         "final_latitude_deg",
         "final_longitude_deg",
         "Where the flights end",
-        ends_below=("final_altitude_km", HIGHEST_LANDING_KM),
+        ends_below=("final_altitude_km", 35.0),  # one that ends higher left the atmosphere again or ran out of time
         planet="planet",
         target=("target_latitude_deg", "target_longitude_deg"),
     ),
     figures.ProfileFigure("speed_m_s", "altitude_km", "Altitude against speed"),
     figures.MapFigure("exit_speed_m_s", "vacuum_periapsis_km", "density_factor", "Speed that a pass leaves"),
     figures.MapFigure(
-        "peak_load_g",
-        "entry_flight_path_angle_error_deg",
-        "entry_speed_error_m_s",
-        "Largest load over the entry errors",
+        "peak_load_g", "entry_flight_path_angle_error_deg", "entry_speed_error_m_s", "Largest load over entry errors"
     ),
     figures.MapFigure(
         "miss_km", "ve_pct", "oe_pct", "Landing miss over the errors of the de-orbit burn", upstream=True
@@ -152,7 +140,10 @@ FIGURES = (
 MODEL = model(
     name="reentry",
     title="Atmospheric entry",
-    source=SOURCE,
+    source=(
+        "N. Mahmoudian, Design of a re-entry guidance and control system based on nominal-trajectory tracking "
+        "(in Persian), M.Sc. thesis, K. N. Toosi University of Technology, early 2000s"
+    ),
     inputs=Inputs,
     clock=AdaptiveStep(
         "time_limit",
@@ -166,11 +157,8 @@ MODEL = model(
     prepare=prepare,
     tables=lambda o: np.zeros(FIRST),  # nothing is shared: reference paths and air are those of `prepare`
     events={
-        "pressure_peak": Event(crossings, "falling", "switch"),
-        "heat_peak": Event(crossings, "falling", "switch"),
-        "pull_out": Event(crossings, "rising", "switch", rare=True),
-        "roll": Event(crossings, "rising", "switch", rare=True),
-        "leave": Event(crossings, "rising", "switch", rare=True),
+        **dict.fromkeys(("pressure_peak", "heat_peak"), Event(crossings, "falling", "switch")),
+        **dict.fromkeys(("pull_out", "roll", "leave"), Event(crossings, "rising", "switch", rare=True)),
         "stop": Event(crossings, "falling", "stop"),
         "left": Event(crossings, "rising", "stop", rare=True),
         "over": Event(crossings, "falling", "stop", rare=True),

@@ -71,20 +71,17 @@ Metrics = metrics(
     target_longitude_deg=Field("longitude of the target, east", sometimes=True),
     reference_range_km=Field("distance over ground to the end of the reference path", sometimes=True),
     saturated_share=Field(
-        "fraction of the guidance's samples at which its command was at a limit",
-        sometimes=True,
-        low=0.0,
-        high=1.0,
-        unit="",
+        "fraction of the guidance's samples with a command at a limit", sometimes=True, low=0.0, high=1.0, unit=""
     ),
     reversals=Field("number of bank reversals of the guidance", low=0.0, unit=""),
     relative_speed_m_s=Field("speed over ground at entry", low=0.0),
     relative_flight_path_angle_deg="flight-path angle over ground at entry",
     ballistic_coefficient_kg_m2=Field(
-        "mass over drag area in hypersonic flow, dispersions included", low=0.0, unit="kg/m^2"
+        "mass over drag area in hypersonic flow, errors included", low=0.0, unit="kg/m^2"
     ),
 )
 Ground = namedtuple("Ground", "latitude longitude downrange crossrange flight_path_angle heading")  # outputs
+Target = namedtuple("Target", "target_latitude target_longitude", defaults=(NAN, NAN))  # metrics
 
 
 @physics
@@ -95,17 +92,15 @@ def ground_of(s, altitude, p, o):
     Downrange goes on beyond the antipodes, from a quarter of a turn behind the entry place to three quarters ahead.
     """
     if o.shape == CHOICES.shape.flat:
-        latitude, longitude, downrange, crossrange = 0.0, 0.0, s.x, -s.y
         path = atan2(s.vz, sqrt(s.vx * s.vx + s.vy * s.vy))
-        heading = p.heading + atan2(-s.vy, s.vx)
-    else:
-        latitude = geodetic_latitude(s.x, s.y, s.z, altitude, p.polar_radius, p.e2)
-        longitude = spherical(s.x, s.y, s.z)[1]
-        up, ahead, right = from_planned_entry(s, p)
-        along = atan2(ahead, up)
-        downrange = p.radius * where(along < -0.25 * TURN, along + TURN, along)
-        crossrange = p.radius * atan2(right, sqrt(up * up + ahead * ahead))
-        path, heading = velocity_angles(s.x, s.y, s.z, s.vx, s.vy, s.vz)
+        return Ground(0.0, 0.0, s.x, -s.y, path, full_turn(p.heading + atan2(-s.vy, s.vx)))
+    latitude = geodetic_latitude(s.x, s.y, s.z, altitude, p.polar_radius, p.e2)
+    _, longitude = spherical(s.x, s.y, s.z)
+    up, ahead, right = from_planned_entry(s, p)
+    along = atan2(ahead, up)
+    downrange = p.radius * where(along < -0.25 * TURN, along + TURN, along)
+    crossrange = p.radius * atan2(right, sqrt(up * up + ahead * ahead))
+    path, heading = velocity_angles(s.x, s.y, s.z, s.vx, s.vy, s.vz)
     return Ground(latitude, longitude, downrange, crossrange, path, full_turn(heading))
 
 
@@ -124,15 +119,14 @@ def observe(t, s, m, p, o):
 
 @physics
 def target_of(p, o):
-    """(geodetic latitude, longitude) of the target [rad], not numbers without one or over a flat Earth."""
-    latitude, longitude = NAN, NAN
-    if o.shape != CHOICES.shape.flat:
-        # at the altitude where the flight ends, so that a hit lies no distance from it
-        r = p.polar_radius / sqrt(1.0 - p.e2 * (1.0 - p.tz * p.tz)) + p.stop_altitude
-        latitude = geodetic_latitude(r * p.tx, r * p.ty, r * p.tz, p.stop_altitude, p.polar_radius, p.e2)
-        longitude = spherical(p.tx, p.ty, p.tz)[1]
-    aimed = p.aimed > 0.5
-    return where(aimed, latitude, NAN), where(aimed, longitude, NAN)
+    """Geodetic latitude and longitude of the `Target` [rad], not numbers without one or over a flat Earth."""
+    if o.shape == CHOICES.shape.flat:
+        return Target()
+    # at the altitude where the flight ends, so that a hit lies no distance from it
+    r = p.polar_radius / sqrt(1.0 - p.e2 * (1.0 - p.tz * p.tz)) + p.stop_altitude
+    latitude = geodetic_latitude(r * p.tx, r * p.ty, r * p.tz, p.stop_altitude, p.polar_radius, p.e2)
+    _, longitude = spherical(p.tx, p.ty, p.tz)
+    return where(p.aim_down > 0.0, Target(latitude, longitude), Target())
 
 
 @physics
@@ -153,13 +147,15 @@ def evaluate(t, s, m, p, o):
         + where(pressed.dynamic_pressure > p.corridor_dynamic_pressure, 1.0, 0.0)
     )
     miss_down, miss_cross = ground.downrange - p.aim_down, ground.crossrange - p.target_crossrange
-    target_latitude, target_longitude = target_of(p, o)
     reference_range = NAN if o.guidance == CHOICES.guidance.none else p.planned_range
     sampled = steering.samples > 0.0
     return merged(
         Metrics,
+        p,
+        steering,
         lowest,
         first,
+        target_of(p, o),
         peak_load=pressed.load,
         peak_load_time=pressed.time,
         peak_load_altitude=pressed.altitude,
@@ -178,13 +174,8 @@ def evaluate(t, s, m, p, o):
         peak_heat_rate_speed=hottest.speed,
         corridor_violations=violations,
         exits=where(leaves, 1.0, met.exits),
-        miss=where(p.aimed > 0.5, sqrt(miss_down * miss_down + miss_cross * miss_cross), NAN),
-        target_latitude=target_latitude,
-        target_longitude=target_longitude,
+        miss=where(p.aim_down > 0.0, sqrt(miss_down * miss_down + miss_cross * miss_cross), NAN),
         reference_range=reference_range,
-        saturated_share=where(sampled, steering.saturated / where(sampled, steering.samples, 1.0), NAN),
-        reversals=steering.reversals,
-        relative_speed=p.speed,
-        relative_flight_path_angle=p.path,
         ballistic_coefficient=where(p.drag > 0.0, 1.0 / where(p.drag > 0.0, p.drag, 1.0), NAN),
+        saturated_share=where(sampled, steering.saturated / where(sampled, steering.samples, 1.0), NAN),
     )

@@ -13,10 +13,7 @@ from mc_engine.physics.curves import curve
 
 
 class Vehicle(NamedTuple):
-    """Numbers of one vehicle, or float64[n] of each case's, by the symbols of the inputs; SI and radians.
-
-    The coefficients are those at trim, at the angle of attack `trim_angle`.
-    """
+    """One vehicle, or float64[n] of each case's, by the symbols of the inputs, SI; coefficients are those at trim."""
 
     mass: float
     reference_area: float

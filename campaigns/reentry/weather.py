@@ -23,15 +23,13 @@ DEPTH = NODES * FIELDS  # index of the depth of the lowest node, in spacings, be
 LENGTH = DEPTH + 1
 # altitude [km] against 1-sigma of the logarithm of the density, of each wind component [m/s], and the mean wind to
 # the east [m/s]
-_PROFILE = np.array(
-    [
-        (0.0, 0.01, 5.0, 3.0),
-        (11.0, 0.015, 18.0, 22.0),
-        (25.0, 0.02, 12.0, 8.0),
-        (60.0, 0.05, 35.0, 35.0),
-        (80.0, 0.085, 45.0, 20.0),
-        (100.0, 0.10, 45.0, 0.0),
-    ]
+_PROFILE = (
+    (0.0, 0.01, 5.0, 3.0),
+    (11.0, 0.015, 18.0, 22.0),
+    (25.0, 0.02, 12.0, 8.0),
+    (60.0, 0.05, 35.0, 35.0),
+    (80.0, 0.085, 45.0, 20.0),
+    (100.0, 0.10, 45.0, 0.0),
 )
 # half of each variance is of the small scale, half of the large one: correlation lengths of first-order Gauss-Markov
 # processes [m]
@@ -49,7 +47,8 @@ def node_altitudes(depth: np.ndarray) -> np.ndarray:
 
 def standard_profile(column: int, altitudes: np.ndarray) -> np.ndarray:
     """One column of the magnitudes at altitudes [m]; constant above 100 km and below the ground."""
-    return np.interp(altitudes, 1e3 * _PROFILE[:, 0], _PROFILE[:, column])
+    profile = np.array(_PROFILE)
+    return np.interp(altitudes, 1e3 * profile[:, 0], profile[:, column])
 
 
 def normal_deviates(draw: np.ndarray, count: int) -> np.ndarray:
@@ -86,28 +85,23 @@ def weather_nodes(draw: np.ndarray, density_size, wind_size, mean_size) -> np.nd
         block = slice(first, first + BLOCK)
         deviates = normal_deviates(draw[block], 2 * DEPTH + 1)
         depth = np.where(draw[block] > 0.0, scipy.special.ndtr(deviates[:, -1]), 0.0)
-        altitudes = node_altitudes(depth)
-        nodes = _random_part(deviates[:, :-1], sizes[:, block], altitudes)
+        altitudes, each = node_altitudes(depth), deviates[:, :-1].reshape(-1, FIELDS, 2, NODES)
+        nodes = out[block, :DEPTH].reshape(-1, NODES, FIELDS)  # a view
+        for field, column in enumerate((1, 2, 2)):
+            # the sum of the two scales, half of the variance each
+            both = gauss_markov(each[:, field, 0], SMALL_SCALE) + gauss_markov(each[:, field, 1], LARGE_SCALE)
+            size = np.sqrt(0.5) * sizes[field, block, None]
+            nodes[:, :, field] = size * both * standard_profile(column, altitudes)
         nodes[:, :, 1] += np.asarray(mean_size)[block, None] * standard_profile(3, altitudes)
-        out[block, :DEPTH], out[block, DEPTH] = nodes.reshape(-1, DEPTH), depth
-    return out
-
-
-def _random_part(deviates: np.ndarray, sizes: np.ndarray, altitudes: np.ndarray) -> np.ndarray:
-    """float64[n, NODES, FIELDS] for sizes [FIELDS, n], SI: the sum of the two scales, half of the variance each."""
-    deviates = deviates.reshape(-1, FIELDS, 2, NODES)
-    out = np.empty((len(deviates), NODES, FIELDS))
-    for field, column in enumerate((1, 2, 2)):
-        both = gauss_markov(deviates[:, field, 0], SMALL_SCALE) + gauss_markov(deviates[:, field, 1], LARGE_SCALE)
-        out[:, :, field] = np.sqrt(0.5) * sizes[field][:, None] * both * standard_profile(column, altitudes)
+        out[block, DEPTH] = depth
     return out
 
 
 @physics
 def _between(tables, at, x):
-    """(value, change of it per node) between two nodes by Hermite's cubic, level in both, in the table's unit."""
-    a, b = look_up(tables, at), look_up(tables, at + 3.0)
-    return a + (b - a) * (x * x * (3.0 - 2.0 * x)), (b - a) * (6.0 * x * (1.0 - x))
+    """(value, slope [1/m]) between two nodes by Hermite's cubic, level in both, in the table's unit."""
+    a, b = look_up(tables, at), look_up(tables, at + FIELDS)
+    return a + (b - a) * (x * x * (3.0 - 2.0 * x)), (b - a) * (6.0 * x * (1.0 - x)) * (1.0 / SPACING)
 
 
 @physics
@@ -119,8 +113,4 @@ def weather_at(h, first, tables):
     place = minimum(maximum(h * (1.0 / SPACING) + look_up(tables, first + DEPTH), 0.0), NODES - 1.000001)
     node = floor(place)
     x, at = place - node, first + FIELDS * node
-    density, density_slope = _between(tables, at, x)
-    east, east_slope = _between(tables, at + 1.0, x)
-    north, north_slope = _between(tables, at + 2.0, x)
-    each = 1.0 / SPACING
-    return Weather(density, density_slope * each, east, east_slope * each, north, north_slope * each)
+    return Weather(*_between(tables, at, x), *_between(tables, at + 1.0, x), *_between(tables, at + 2.0, x))

@@ -1,7 +1,6 @@
 """Our values of published numbers that are no metric of a case.
 
-H. Taei, S. Ayati, S. F. Mousavi, Iranian Journal of Mechanical Engineering 24 (2022), no. 3.  The records name these
-functions; each returns its value in the unit of the record.
+The records name these functions; each returns its value in the unit of the record.
 """
 
 from functools import lru_cache
@@ -20,9 +19,6 @@ _FOLDER = Path(__file__).resolve().parents[1]
 MODULATOR = ("pwpf_gain", "pwpf_time_constant_s", "pwpf_u_off", "pwpf_hysteresis", "thrust_level")
 PWPF: dict[str, Any] = {"actuator": "pwpf", "step_s": 0.005}
 TABLE_8: dict[str, Any] = PWPF | dict(zip(MODULATOR, (7.39, 0.713, 0.117, 0.225, 1.07), strict=True))
-_SETTLED_S = 200.0  # Table 8's thrusters have reached the attitude long before
-_FEWEST_SIGN_CHANGES = 30
-_LARGEST_MEAN = 0.03  # of a mode's largest value
 
 
 def thruster_torque_n_m() -> float:
@@ -45,13 +41,14 @@ def largest_final_rate_rad_s() -> float:
 def oscillation() -> str:
     """The source's words on the modes under Table 8's thrusters, if they are true of every mode from 200 s on.
 
-    True is: 30 changes of sign and more, and a mean below 3 % of the largest value.
+    True is: 30 changes of sign and more, and a mean below 3 % of the largest value.  The attitude is reached long
+    before 200 s.
     """
     history = chosen_history(MODEL, TABLE_8, rows=200_000)  # every step
-    modes = [history[f"eta_{mode}"][history["t_s"] > _SETTLED_S] for mode in (1, 2, 3, 4)]
+    modes = [history[f"eta_{mode}"][history["t_s"] > 200.0] for mode in (1, 2, 3, 4)]
     changes = [np.count_nonzero(np.diff(np.sign(mode))) for mode in modes]
-    centred = [abs(mode.mean()) < _LARGEST_MEAN * np.abs(mode).max() for mode in modes]
-    return "oscillate about zero" if min(changes) >= _FEWEST_SIGN_CHANGES and all(centred) else "do not"
+    centred = [abs(mode.mean()) < 0.03 * np.abs(mode).max() for mode in modes]
+    return "oscillate about zero" if min(changes) >= 30 and all(centred) else "do not"
 
 
 def optimum(stage: str, parameter: str) -> float:

@@ -53,10 +53,7 @@ def _anomaly_difference(m: np.ndarray, cosine: np.ndarray, sine: np.ndarray) -> 
 
 
 def coast(y: np.ndarray, dt: np.ndarray) -> np.ndarray:
-    """States [n, 12] (place, velocity, primer vector, its rate), canonical, a time dt [n] after y: (19)-(21).
-
-    y : float64[n, 12], or float64[12] of one state that counts for every time
-    """
+    """States [n, 12] (place, velocity, primer vector, its rate), canonical, dt after y, [n, 12] or [12]: (19)-(21)."""
     start = y[..., :6] + 1j * IMAGINARY * y[..., 6:]
     end = np.concatenate(kepler(start[..., :3], start[..., 3:], dt), axis=-1)
     return np.concatenate([end.real, end.imag / IMAGINARY], axis=-1)

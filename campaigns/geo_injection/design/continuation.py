@@ -16,11 +16,11 @@ import scipy  # loads its packages when they are used
 
 from campaigns.geo_injection.design.coast import coast
 from campaigns.geo_injection.design.optimal import (
+    FIRST_OF_THREE,
     FIRST_PLACE,
     Instead,
     Problem,
     Solution,
-    first_burn,
     first_states,
     local_axes,
     solve,
@@ -63,8 +63,9 @@ def optimum(problem: Problem) -> Solution:
 
 
 def two_impulses(plane_change: float, ratio: float) -> Impulsive:
-    """Two impulses at the apses on the node, least in speed over a split of the plane change [rad], between circles of
-    radius 1 and `ratio`: a bound of every sequence's propellant from below, and the guess that the search begins with.
+    """Two impulses at the apses on the node, between circles of radius 1 and `ratio`, canonical units.
+
+    Least in speed over a split of the plane change: a bound of every sequence's propellant from below, and a guess.
     """
     a = 0.5 * (1.0 + ratio)
     at_perigee, at_apogee, final = np.sqrt(ratio / a), np.sqrt(1.0 / (ratio * a)), np.sqrt(1.0 / ratio)
@@ -78,10 +79,7 @@ def two_impulses(plane_change: float, ratio: float) -> Impulsive:
     def cost(inclination: float) -> float:
         return float(sum(np.linalg.norm(change) for change in changes(inclination)))
 
-    best = 0.0
-    if plane_change > 0.0:
-        found = scipy.optimize.minimize_scalar(cost, bounds=(0.0, plane_change), options={"xatol": 1e-12})
-        best = float(found.x)
+    best = scipy.optimize.minimize_scalar(cost, bounds=(0.0, plane_change), options={"xatol": 1e-12}).x
     first, second = changes(best)
     start = np.array([1.0, 0.0, 0.0, 0.0, at_perigee * np.cos(best), at_perigee * np.sin(best)])
     sizes = float(np.linalg.norm(first)), float(np.linalg.norm(second))
@@ -137,17 +135,14 @@ def _two_burns(problem: Problem) -> np.ndarray:
 
 
 def _widened(problem: Problem) -> Problem:
-    """The problem with a plane change that is not small: at a small one every place on a circle is nearly as good for
-    the first ignition, and the search at a large thrust loses its way.
-    """
+    """The problem with a plane change that is not small: at a small one, a large thrust may begin nearly anywhere."""
     return problem if problem.plane_change == 0.0 else replace(problem, plane_change=max(problem.plane_change, WIDE))
 
 
 def _from_node(problem: Problem, descending: bool = False) -> np.ndarray:
     """Impulses at a large thrust, then the eccentricity, then less thrust, then less plane change if it is small.
 
-    About the descending node: from the mirror image about the earth's centre, which a circle allows.  It changes the
-    sign of the normal components and moves the place by pi [rad].
+    About the descending node: from the mirror image about the earth's centre, which a circle allows.
     """
     wide = _widened(problem)
     circle = replace(wide.with_thrust(max(LARGE_THRUST, wide.thrust)), eccentricity=0.0)
@@ -155,7 +150,7 @@ def _from_node(problem: Problem, descending: bool = False) -> np.ndarray:
     if x is None:
         raise ModelError("the search for the optimal burns did not start, not even at a large thrust")
     if descending:
-        x[[3, 6]] *= -1.0
+        x[[3, 6]] *= -1.0  # the normal components
         x[0] += np.pi
     ellipse = replace(circle, eccentricity=problem.eccentricity)
     return _follow(wide, problem, _follow(ellipse, wide, _follow(circle, ellipse, x)))
@@ -177,15 +172,10 @@ def _from_perigee(problem: Problem) -> np.ndarray:
 
 def _best_place(problem: Problem, x: np.ndarray) -> np.ndarray:
     """Unknowns with the first place [rad] free: it is moved by steps while the burns grow shorter."""
-
-    def moved(x: np.ndarray, by: float) -> np.ndarray | None:
-        """The solution with the first place moved by an angle [rad] and held there."""
-        return solve(problem, x + by * np.eye(1, x.size)[0], FIRST_PLACE)
-
     for by in (_PLACE_STEP, -_PLACE_STEP):
-        following = moved(x, by)
-        while following is not None and following[7:9].sum() < x[7:9].sum():
-            x, following = following, moved(following, by)
+        step = by * np.eye(1, x.size)[0]
+        while (moved := solve(problem, x + step, FIRST_PLACE)) is not None and moved[7:9].sum() < x[7:9].sum():
+            x = moved
     best = solve(problem, x)
     if best is None or abs(best[0] - x[0]) > 3.0 * _PLACE_STEP:
         raise ModelError("the search for the optimal burns found no best place of the first one on the parking orbit")
@@ -243,8 +233,7 @@ def _how_far(here: Problem, end: Problem, x: np.ndarray) -> str:
 def _longer_burns(here: Problem, there: Problem, x: np.ndarray) -> np.ndarray:
     """The same sequence with burns longer by what the thrust is smaller, about the same middles.
 
-    The burn times scale with 1 / thrust; sqrt(1 + e) is the rate of the place at perigee, in canonical
-    units.
+    The burn times scale with 1 / thrust; sqrt(1 + e) is the rate of the place at perigee, in canonical units.
     """
     n, guess = here.burns, x.copy()
     guess[7 : 7 + n] *= here.thrust / there.thrust
@@ -276,21 +265,21 @@ def _with_burn_ahead(problem: Problem, two: np.ndarray) -> np.ndarray | None:
     as at its start.  Durations in canonical units, the short burn as a fraction of the first of the two.
     """
     grow = _SHORT * two[7]
-    x = solve(problem, _short_burn_ahead(problem, two, grow), first_burn(problem))
+    x = solve(problem, _short_burn_ahead(problem, two, grow), FIRST_OF_THREE)
     last = None
     while x is not None and x[8] > _SHORT * two[7]:
         if last is not None and _gap(problem, x) * _gap(problem, last) < 0.0:
             return _where_lengths_agree(problem, last, x)
-        longer = None
-        while longer is None and grow > 1e-4 * two[7]:
-            longer = _longer(problem, last, x, grow)
-            grow = grow if longer is not None else 0.5 * grow
+        while (longer := _longer(problem, last, x, grow)) is None and grow > 2e-4 * two[7]:
+            grow *= 0.5
         last, x = x, longer
     return None
 
 
-def _gap(problem: Problem, x: np.ndarray) -> float:
+def _gap(problem: Problem, x: np.ndarray | None) -> float:
     """Length of the primer vector after the first coast less that before, 0 at the optimum: Lawden, chapter 5."""
+    if x is None:
+        return np.nan
     size = np.linalg.norm(switch_states(problem, x[None])[0, :, 6:9], axis=1)
     return float(size[2] - size[1])
 
@@ -299,25 +288,18 @@ def _longer(problem: Problem, before: np.ndarray | None, x: np.ndarray, grow: fl
     """The solution with a first burn longer by `grow`, canonical units; the guess is linear in that burn's duration."""
     guess = x - grow * np.eye(1, x.size, 8)[0] if before is None else x + (x - before) * grow / (x[7] - before[7])
     guess[7] = x[7] + grow
-    return solve(problem, guess, first_burn(problem))
+    return solve(problem, guess, FIRST_OF_THREE)
 
 
 def _where_lengths_agree(problem: Problem, low: np.ndarray, high: np.ndarray) -> np.ndarray | None:
-    """Between two solutions of opposite gaps: a root of the gap, then all conditions at once.
-
-    Canonical units.
-    """
+    """Between two solutions of opposite gaps: a root of the gap, then all conditions; canonical units."""
 
     def between(share: float) -> np.ndarray | None:
         """Unknowns solved for from a guess that is a fraction of the way from `low` to `high`."""
-        return solve(problem, low + share * (high - low), first_burn(problem))
-
-    def gap(share: float) -> float:
-        x = between(share)
-        return np.nan if x is None else _gap(problem, x)
+        return solve(problem, low + share * (high - low), FIRST_OF_THREE)
 
     try:
-        x = between(scipy.optimize.brentq(gap, 0.0, 1.0, xtol=1e-9))
+        x = between(scipy.optimize.brentq(lambda share: _gap(problem, between(share)), 0.0, 1.0, xtol=1e-9))
     except ValueError:  # a gap is not a number: there is no solution on the way
         return None
     return None if x is None else solve(problem, x)

@@ -6,8 +6,7 @@
 from types import SimpleNamespace
 from typing import Any
 
-from campaigns.geo_injection.design.program import KEPT, new_design, to_text
-from campaigns.geo_injection.design.sequence import Sequence
+from campaigns.geo_injection.design.program import KEPT, Sequence, new_design, to_text
 from campaigns.geo_injection.model import MODEL, sequence_of
 
 

@@ -1,9 +1,9 @@
 """The free-time optimum, and its check: least burn time over steering, burns, coasts and place of the first ignition.
 
-One primer vector lives through all burns and coasts.  With the duration of everything free, the Hamiltonian of the
-coasts H = q.v - p.g is zero at the start and end of every burn, and the primer vector is as long at the end of a coast
-as at its start; so the switching function is zero at every switch.  D. F. Lawden, Optimal Trajectories for Space
-Navigation (1963), chapter 5; the source leaves this out and places its burns by rule (`staged.py`).
+One primer vector lives through all burns and coasts.  With all durations free, the Hamiltonian of the coasts
+H = q.v - p.g is zero at every switch, and the primer vector is as long at the end of a coast as at its start; so the
+switching function is zero at every switch.  D. F. Lawden, Optimal Trajectories for Space Navigation (1963), chapter 5;
+the source leaves this out and places its burns by rule (`staged.py`).
 
 Canonical units: perigee radius of the parking orbit, the circular speed there, initial mass.  Axes: x to the ascending
 node of the parking orbit, z normal to the final orbit.
@@ -65,10 +65,7 @@ def unknowns_of(
 
 
 def switch_states(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
-    """States [n, 2 burns, 12] at the ignitions and cut-offs of n sets of unknowns [n, 6 + 2 burns].
-
-    Coasts by eqs (19)-(21) of the source, burns by (1) and (16).
-    """
+    """States [n, 2 burns, 12] at ignitions and cut-offs of unknowns [n, 6 + 2 burns]: eqs (19)-(21), (1) and (16)."""
     mass, states = np.ones(len(unknowns)), [first_states(problem, unknowns)]
     for k, duration in enumerate(unknowns[:, 7 : 7 + problem.burns].T):
         if k > 0:
@@ -107,10 +104,10 @@ def coast_hamiltonian(y: np.ndarray) -> np.ndarray:
 
 
 def residuals(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
-    """What is zero at the optimum, [n, 6 + 2 burns] for unknowns of the same shape.
+    """What is zero at the optimum, for unknowns of the same shape, [n, 6 + 2 burns].
 
-    The final circle (five conditions, eq. (17) of the source and two speeds), H = 0 at the first ignition and at every
-    cut-off, equal primer vectors at both ends of a coast, and the length 1 of the last one, which is their scale.
+    The final circle (eq. (17) of the source and two speeds), H = 0 at the first ignition and at every cut-off, primer
+    vectors of one length at both ends of a coast, and the length 1 of the last one, which is their scale.
     """
     y = switch_states(problem, unknowns)
     r, v, ends = y[:, -1, :3], y[:, -1, 3:6], y[:, 1::2]
@@ -129,14 +126,14 @@ def residuals(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
     return np.column_stack(columns)
 
 
-Conditions = Callable[[np.ndarray], np.ndarray]  # zero where they are met: [n, m] at n sets of unknowns [n, k]
-
-
-def searched(conditions: Conditions, guess: np.ndarray, most: int | None = None) -> tuple[np.ndarray, float, int]:
+def searched(
+    conditions: Callable[[np.ndarray], np.ndarray], guess: np.ndarray, most: int | None = None
+) -> tuple[np.ndarray, float, int]:
     """(unknowns near a guess, largest residual in the unit of the conditions, iterations), for unknowns of about one.
 
-    Levenberg-Marquardt of at most `most` evaluations, then two Newton steps; the Jacobian by central differences over
-    all unknowns at once.  What is not finite counts as far from being met.
+    conditions : zero where they are met, [n, m] at n sets of unknowns [n, k]; what is not finite counts as far from it
+
+    Levenberg-Marquardt of at most `most` evaluations, then two Newton steps; the Jacobian by central differences.
     """
 
     def value(x: np.ndarray) -> np.ndarray:
@@ -159,18 +156,14 @@ def searched(conditions: Conditions, guess: np.ndarray, most: int | None = None)
 
 Instead = tuple[int, int]  # (condition that is left out, unknown that keeps its guess for it)
 FIRST_PLACE: Instead = (5, 0)  # H at the first ignition may be what it will
-
-
-def first_burn(problem: Problem) -> Instead:
-    """The first burn keeps its duration; the primer vectors around the coast after it may then differ."""
-    return 6 + problem.burns, 7
+FIRST_OF_THREE: Instead = (9, 7)  # the duration; the primer vectors around the coast after this burn may then differ
 
 
 def solve(problem: Problem, guess: np.ndarray, instead: Instead | None = None) -> np.ndarray | None:
     """Unknowns of the optimum near a guess, canonical units, or None.
 
-    A planar sequence keeps its primer vector in the plane, and may begin anywhere on a circular parking orbit, so that
-    its first place is held; one of its conditions follows from the others, which Levenberg-Marquardt does not mind.
+    A planar sequence keeps its primer vector in the plane, and may begin anywhere on a circular parking orbit: its
+    first place is held.  One of its conditions follows from the others, which Levenberg-Marquardt does not mind.
     """
     held = np.zeros((3, guess.size))
     if problem.plane_change == 0.0:
@@ -192,8 +185,7 @@ def solve(problem: Problem, guess: np.ndarray, instead: Instead | None = None) -
 
 
 def is_optimal(solution: Solution, tolerance: float = 1e-9, n: int = 200) -> bool:
-    """Whether the switching function has its right sign at n instants of each arc: else another burn would pay, or one
-    too many is.
+    """Whether the switching function has its right sign at n instants of each arc: else more or fewer burns would pay.
 
     It is S = k - T |p| / m - flow l, with a constant k, and S + q.v - p.g = 0 on burns: eq. (13) of the source with its
     mass costate l, canonical units.  On coasts m and l rest, and S is zero at the start.

@@ -3,30 +3,26 @@
 M. Alavipour, A. A. Nikkhah, J. Roshanian.  The records of `*.toml` name these functions; each returns its value in the
 unit of the record.
 
-The burns of tables 2 to 8 are computed one by one, in the source's own conventions, between the orbits that it prints:
-each takes the least time from its old orbit to its new one.  The mass at its ignition is what the printed propellant of
-the burns before it leaves.
+The burns of tables 2 to 8 take the least time each, in the source's own conventions, between the orbits that it prints.
+The mass at ignition is what the printed propellant of the burns before leaves.
 
-- The first burn is ignited on the node of the parking orbit; size, shape and inclination of the new orbit and its node
-  are given, its apse line is free.
+- The first burn is ignited on the node of the parking orbit; size, shape, inclination and node of the new orbit are
+  given, its apse line is free.
 - A second burn at perigee is centred in time on the perigee of the printed orbit, which is on the node; the apse line
   of the new orbit is free.
-- The last burn, to the geostationary circle, begins where it lasts shortest about the apogee of the printed orbit,
-  which is on the node.
+- The last burn begins where it lasts shortest about the apogee of the printed orbit, which is on the node.
 
 So the printed burns do not make one continuous flight, and neither do these.
 """
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
+from campaigns.geo_injection.design import staged
 from campaigns.geo_injection.design.kept_programs import SEQUENCES
-from campaigns.geo_injection.design.program import program_for
-from campaigns.geo_injection.design.sequence import source_orbits
-from campaigns.geo_injection.design.single_burn import Burn, Rise, Stage, circle, fly_shortest, orbit, rise_guess
-from campaigns.geo_injection.design.staged import Orbit, shortest, staged
+from campaigns.geo_injection.design.program import program_for, source_orbits
 from mc_engine.physics.constants import MU_EARTH, STANDARD_GRAVITY
 
 # propellant [kg] used by the end of each burn but the last: tables 2, 3, 4, 7 and 8
@@ -47,7 +43,7 @@ _ACCELERATION = THRUST / MASS / (MU_EARTH / RADIUS**2)  # over the first weight,
 _FLOW = MASS_FLOW / MASS * float(np.sqrt(RADIUS**3 / MU_EARTH))
 
 
-def printed_orbits(sequence: str) -> tuple[Orbit, ...]:
+def printed_orbits(sequence: str) -> tuple[staged.Orbit, ...]:
     """The orbits between the burns of a sequence of USED_KG, in canonical units."""
     flown = SEQUENCES[sequence]
     return replace(flown, between=source_orbits(flown.burns, flown.initial_inclination)).orbits_between()
@@ -70,57 +66,53 @@ def burn_share_pct(larger: str, smaller: str, number: int | None = None) -> floa
 
 
 @lru_cache
-def _burn(sequence: str, number: int) -> Burn:
+def _burn(sequence: str, number: int) -> staged.Burn:
     """The burn of least time, searched from an impulse at the apsis; canonical units."""
     problem, between = SEQUENCES[sequence].problem(), printed_orbits(sequence)
-    before = (Orbit(1.0, 0.0, problem.plane_change), *between)[number - 1]
+    before = (staged.Orbit(1.0, 0.0, problem.plane_change), *between)[number - 1]
     mass = 1.0 - (0.0, *USED_KG[sequence])[number - 1] / SEQUENCES[sequence].mass
     if number > len(between):
-        reached, placing, inclination = circle(problem.ratio), "free", 0.0
+        reached, placing, inclination = partial(staged.circle_reached, problem.ratio), "free", 0.0
         start, wanted = before.apsis(np.pi), -np.sqrt(1.0 / problem.ratio)
     else:
         new, placing = between[number - 1], "fixed" if number == 1 else "centred"
-        reached, inclination = orbit(new.a, new.e, new.inclination, apse_on_node=False), new.inclination
+        reached, inclination = partial(new.reached, apse_on_node=False), new.inclination
         start = before.apsis(0.0)
         wanted = np.sqrt(2.0 / np.linalg.norm(start[:3]) - 1.0 / new.a)  # vis-viva
-    return shortest(Stage(start, mass, problem.thrust, problem.flow, reached, placing), wanted, inclination)
+    stage = staged.Stage(start, mass, problem.thrust, problem.flow, reached, placing)
+    return staged.shortest(stage, wanted, inclination)
 
 
 @lru_cache
-def avoidance() -> Burn:
+def avoidance() -> staged.Burn:
     """The burn of least time, searched from eq. (18); canonical, the radial place costate being 1."""
-    start, reached = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0]), circle(1.0 + RISE * _ACCELERATION)
-    stage = Stage(start, 1.0, _ACCELERATION, _FLOW, reached, placing="fixed", step=_STEP)
-    time, radial, transverse = rise_guess(RISE)
-    return fly_shortest(stage, np.array([radial, transverse, 0.0]), np.array([-1.0, -radial, 0.0]), time, 0.0)
+    start = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])
+    reached = partial(staged.circle_reached, 1.0 + RISE * _ACCELERATION)
+    stage = staged.Stage(start, 1.0, _ACCELERATION, _FLOW, reached, placing="fixed", step=_STEP)
+    time, radial, transverse = staged.rise_guess(RISE)
+    return staged.fly_shortest(stage, np.array([radial, transverse, 0.0]), np.array([-1.0, -radial, 0.0]), time, 0.0)
 
 
 def avoidance_analytic(column: str) -> float:
-    """Row 1 of table 1, eq. (18), canonical.  column : of `Rise`"""
-    return getattr(rise_guess(RISE), column)
+    """Row 1 of table 1, eq. (18), canonical.  column : of `staged.Rise`"""
+    return getattr(staged.rise_guess(RISE), column)
 
 
 def avoidance_converged(column: str) -> float:
     """Row 4 of table 1, the solution of the boundary-value problem, canonical, in the scale and sign of the table."""
     burn = avoidance()
-    return getattr(Rise(burn.duration, *(burn.start[6:8] / -burn.start[9])), column)
+    return getattr(staged.Rise(burn.duration, *(burn.start[6:8] / -burn.start[9])), column)
 
 
 def avoidance_iterations() -> int:
-    """Steps of our search (Levenberg–Marquardt, to 1e-9) for row 4 of table 1."""
+    """Steps of our search (Levenberg–Marquardt) for row 4 of table 1."""
     return avoidance().iterations
 
 
-@lru_cache
-def _iterations() -> list[int]:
-    """Steps of our search for each burn of the staged sequences over the printed orbits."""
-    flown = [staged(SEQUENCES[name].problem(), printed_orbits(name)) for name in USED_KG]
-    return [stage.burn.iterations for stages in flown for stage in stages]
-
-
 def iterations(which: str) -> int:
-    """The least or the most of these steps; text on the solution.  which : "least" or "most"."""
-    return {"least": min, "most": max}[which](_iterations())
+    """Steps of our search for a burn of the staged sequences over the printed orbits: the "least" or the "most"."""
+    sequences = [staged.staged(SEQUENCES[name].problem(), printed_orbits(name)) for name in USED_KG]
+    return {"least": min, "most": max}[which](burn.iterations for burns in sequences for burn in burns)
 
 
 def optimal_burns_s(sequence: str) -> float:

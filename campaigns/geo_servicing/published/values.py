@@ -1,12 +1,11 @@
 """Our values of published numbers that are no metric of a case.
 
-Hoang Vu Tan, 2021.  The records name these functions; each returns its value in the unit of the record.
+The records name these functions; each returns its value in the unit of the record.
 """
 
-from collections import namedtuple
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -14,14 +13,14 @@ from campaigns.geo_servicing.dynamics import R0
 from campaigns.geo_servicing.model import MODEL, nominal_start
 from campaigns.geo_servicing.phasing_plan import PUBLISHED, design
 from campaigns.geo_servicing.planned_flight import Craft
-from mc_engine.flight.flight import chosen_history
+from mc_engine.flight.flight import chosen_history, settings_of
 from mc_engine.studies.published_values import dispersed_cases
 
 _FOLDER = Path(__file__).resolve().parents[1]
 # the source's corrections without errors, gravity 4 x 4, Moon and Sun
 SCHEDULE: dict[str, Any] = {"schedule": "published", "feedback": False, "navigation": "perfect", "sunlight": False}
-# tolerances of section 8.1 on longitude, period and eccentricity
-LONGITUDE_DEG, PERIOD_S, ECCENTRICITY = 0.05, 5.0, 4e-4
+# tolerances of section 8.1
+TOLERANCES = {"mean_longitude_deviation_deg": 0.05, "period_error_s": 5.0, "eccentricity": 4e-4}
 
 
 def _per_run(metric: str) -> np.ndarray:
@@ -42,10 +41,8 @@ def extreme(metric: str, which: str) -> float:
 
 def share_in_tolerance_pct() -> float:
     """Share [%] of trials inside the tolerances of section 8.1, one error a run; section 9.2."""
-    inside = np.abs(_per_run("mean_longitude_deviation_deg")) < LONGITUDE_DEG
-    inside &= np.abs(_per_run("period_error_s")) < PERIOD_S
-    inside &= _per_run("eccentricity") < ECCENTRICITY
-    return 100.0 * float(inside.mean())
+    inside = [np.abs(_per_run(metric)) < limit for metric, limit in TOLERANCES.items()]
+    return 100.0 * float(np.all(inside, axis=0).mean())
 
 
 def steady_share_pct() -> float:
@@ -70,15 +67,14 @@ def burn_signs() -> str:
 
 def craft_of(**chosen: Any) -> Craft:
     """The craft that plans are made for under these settings, the others nominal."""
-    codes = [setting.code(chosen.get(setting.name, setting.default)) for setting in MODEL.settings]
-    names = [*(setting.symbol for setting in MODEL.settings), "tables"]
-    settings = cast("Any", namedtuple("Settings", names))
-    return Craft(*nominal_start(settings(*codes, np.empty(0))))
+    chosen = {"phase": "free"} | chosen  # without a plan
+    codes = np.array([setting.code(chosen.get(setting.name, setting.default)) for setting in MODEL.settings])
+    return Craft(*nominal_start(settings_of(MODEL, codes)))
 
 
 @lru_cache
 def _designed() -> dict[str, np.ndarray]:
-    """The burns of our own plan and the coasts before them [s], float64[3] each."""
+    """The burns of our own plan and the coasts before them [s]."""
     craft = craft_of(navigation="perfect", sunlight=False)
     plan = design(craft)
     return {"coast": plan.coasts, "burn": craft.burn_times(plan.dv)}

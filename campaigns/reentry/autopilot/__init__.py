@@ -1,7 +1,4 @@
-"""Attitude autopilot of an entering capsule, a model of its own: `MODEL` is what a campaign file names.
-
-`gains` designs the loops with `lead_compensator`, `model` flies them, `bode_figure` draws them.
-"""
+"""Attitude autopilot of an entering capsule, a model of its own: `MODEL` is what a campaign file names."""
 
 from campaigns.reentry.autopilot.model import MODEL
 

@@ -1,14 +1,14 @@
 """Bode diagram of the autopilot's pitch loop: `python -m campaigns.reentry.autopilot.bode_figure bode.png`."""
 
 import sys
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from campaigns.reentry.autopilot.gains import pitch_design
 from campaigns.reentry.autopilot.lead_compensator import Compensator, Response
-from campaigns.reentry.autopilot.model import MODEL
+from campaigns.reentry.autopilot.model import MODEL, pitch_design
 
 
 def bode_figure(loops: dict[str, tuple[Response, float, Compensator]]) -> Any:
@@ -37,12 +37,7 @@ def bode_figure(loops: dict[str, tuple[Response, float, Compensator]]) -> Any:
     return figure
 
 
-def main(path: str) -> None:
-    """Draw the pitch loop of the autopilot campaign at dynamic pressures of 0, 4e3 and 12e3 [Pa]."""
-    o = {setting.symbol: setting.code(setting.default) for setting in MODEL.settings}
-    loops = {f"{pressure / 1e3:g} kPa": pitch_design(o, pressure) for pressure in (0.0, 4e3, 12e3)}
-    bode_figure(loops).savefig(path, dpi=120)
-
-
 if __name__ == "__main__":
-    main(sys.argv[1])
+    o = SimpleNamespace(**{setting.symbol: setting.code(setting.default) for setting in MODEL.settings})
+    loops = {f"{pressure / 1e3:g} kPa": pitch_design(o, pressure) for pressure in (0.0, 4e3, 12e3)}
+    bode_figure(loops).savefig(sys.argv[1], dpi=120)

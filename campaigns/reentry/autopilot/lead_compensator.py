@@ -37,17 +37,13 @@ class Compensator(NamedTuple):
 
 def crossover_of(loop: Response, level: float = 1.0) -> float:
     """Highest frequency [rad/s] at which the loop's gain falls through a level."""
-
-    def above(logarithm: float) -> float:
-        """Logarithm of the gain, in units of the level, at the logarithm of a frequency [rad/s]."""
-        return float(np.log(np.abs(loop(np.exp(logarithm))) / level))
-
-    grid = np.log(FREQUENCIES)
     high = np.abs(loop(FREQUENCIES)) > level
     if not high.any() or high[-1]:
         raise ValueError("the gain does not fall through this level between 1e-3 and 1e4 rad/s")
     last = int(np.flatnonzero(high)[-1])
-    return float(np.exp(scipy.optimize.brentq(above, grid[last], grid[last + 1], xtol=1e-13)))
+    low, up = np.log(FREQUENCIES)[last : last + 2]
+    found = scipy.optimize.brentq(lambda x: np.log(np.abs(loop(np.exp(x))) / level), low, up, xtol=1e-13)
+    return float(np.exp(found))
 
 
 def margins_of(loop: Response) -> Margins:
@@ -62,15 +58,10 @@ def design_lead(plant: Response, gain: float, margin: float) -> Compensator:
     The crossover moves up, where the plant may lag more: the lead is changed until the margin is the one asked for.  A
     margin that one stage cannot give is as large as it can.
     """
-
-    def bare(w):
-        """Complex gain, without the lead, at a frequency w [rad/s]."""
-        return gain * plant(w)
-
-    wanted = margin - margins_of(bare).phase + np.radians(5.0)
+    wanted = margin - margins_of(lambda w: gain * plant(w)).phase + np.radians(5.0)
     for _ in range(30):
         alpha = ratio_of_lead(min(max(wanted, 1e-3), LARGEST_LEAD))
-        lead = stage(gain, alpha, crossover_of(bare, float(np.sqrt(alpha))))
+        lead = stage(gain, alpha, crossover_of(lambda w: gain * plant(w), float(np.sqrt(alpha))))
         short = margin - lead.margins(plant).phase
         if abs(short) <= 1e-6:
             break

@@ -7,11 +7,13 @@ Both torques are limited.  The pitch gains follow the dynamic pressure.
 
 from collections import namedtuple
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
-from campaigns.reentry.autopilot.gains import BANK, LAST_SECOND, PITCH, PROFILE, STEEPEST, STEPS, autopilot_tables
-from campaigns.reentry.autopilot.lead_compensator import Compensator
+from campaigns.reentry.autopilot.lead_compensator import Compensator, Response, design_lead, short_period
+from campaigns.reentry.guidance.plan import plan_of
+from campaigns.reentry.guidance.reference import SPEED, fly_reference
 from campaigns.reentry.guidance.reference_table import between_rows
 from mc_engine.lanes import floor, look_up, look_up_record, maximum, merged, minimum, physics, replace, sqrt, where
 from mc_engine.model import (
@@ -90,7 +92,7 @@ Outputs = outputs(
 # corners where the errors go through zero
 Metrics = metrics(
     peak_alpha_deg=maximum_of("alpha_size_deg", "largest angle of attack error", smooth=False),
-    peak_alpha_time_s=time_of_maximum("alpha_size_deg", "when", smooth=False),
+    peak_alpha_time_s=time_of_maximum("alpha_size_deg", "time of the largest angle of attack error", smooth=False),
     late_alpha_time_s=last_above(
         "alpha_size_deg", float(np.radians(1.0)), "last time with an angle of attack error above one degree"
     ),
@@ -103,6 +105,41 @@ Metrics = metrics(
 )
 # states and outputs that both loops give, by their names
 Loops = namedtuple("Loops", "torque_pitch torque_roll bank_error lead_alpha lead_bank limited")
+
+# The tables: last second of the profile, compensator of the bank loop, those of the pitch loop at equal steps of
+# pressure, and the profile: dynamic pressure and speed of the planned entry second by second; SI.
+STEPS, STEEPEST = 48, 24e3  # compensators of the pitch loop, up to this pressure [Pa]
+LAST_SECOND, BANK, PITCH = 0, 1, 4
+PROFILE = PITCH + 3 * STEPS
+
+
+def pitch_design(o: Any, pressure: float) -> tuple[Response, float, Compensator]:
+    """(plant, gain, lead compensator) of the pitch loop at a dynamic pressure [Pa]; o: settings by symbol.
+
+    The plant is undamped: angle over angular acceleration.  The gain makes the loop stiffer than the air by the square
+    of the bandwidth asked for, and as stiff again: a moment moves the angle half as far as without an autopilot.
+    """
+    stiffness = -pressure * o.area * o.diameter * o.c_m_alpha / o.inertia_pitch
+    plant, gain = short_period(stiffness), o.bandwidth**2 + stiffness
+    return plant, gain, design_lead(plant, gain, o.phase_margin)
+
+
+def planned_profile() -> np.ndarray:
+    """float64[n, 2]: dynamic pressure [Pa] and speed [m/s] of the planned entry at whole seconds."""
+    plan = plan_of()
+    path = fly_reference(plan)
+    t = np.arange(0.0, path.t[-1])
+    return np.array([np.interp(t, path.t, path.drag) / plan.drag, np.interp(t, path.t, path.state[SPEED])]).T
+
+
+def autopilot_tables(o: Any) -> np.ndarray:
+    """What the autopilot's flight reads, for its settings o, SI."""
+    pressures = np.linspace(0.0, STEEPEST, STEPS) if o.scheduled > 0.5 else np.full(STEPS, o.fixed_pressure)
+    # the plant of the bank loop is the double integrator 1/s^2
+    bank = design_lead(short_period(0.0), o.bandwidth**2, o.phase_margin)
+    leads = [bank, *(pitch_design(o, pressure)[2] for pressure in pressures)]
+    profile = planned_profile()
+    return np.concatenate([[len(profile) - 1], np.ravel(leads), np.ravel(profile)])
 
 
 def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
@@ -142,11 +179,8 @@ def pitch_gains(pressure, o):
     place = minimum(maximum(pressure * ((STEPS - 1) / STEEPEST), 0.0), STEPS - 1.000001)
     step = floor(place)
     x, row = place - step, PITCH + 3.0 * step
-    return Compensator(
-        gain=between_rows(o.tables, row, 3.0, x),
-        zero=between_rows(o.tables, row + 1.0, 3.0, x),
-        pole=between_rows(o.tables, row + 2.0, 3.0, x),
-    )
+    gain, zero = between_rows(o.tables, row, 3.0, x), between_rows(o.tables, row + 1.0, 3.0, x)
+    return Compensator(gain, zero, pole=between_rows(o.tables, row + 2.0, 3.0, x))
 
 
 @physics
@@ -209,12 +243,8 @@ def observe(t, s, p, o):
 @physics
 def evaluate(t, s):
     """Metrics, SI and radians; means over the flight from integrals of squares."""
-    return Metrics(
-        alpha_rms=sqrt(s.alpha_square / t),
-        bank_rms=sqrt(s.bank_square / t),
-        impulse=s.impulse,
-        limited_share=s.limited / t,
-    )
+    alpha, bank = sqrt(s.alpha_square / t), sqrt(s.bank_square / t)
+    return merged(Metrics, s, alpha_rms=alpha, bank_rms=bank, limited_share=s.limited / t)
 
 
 MODEL = model(

@@ -10,17 +10,7 @@ from collections import namedtuple
 
 from campaigns.reentry.bank import followed, lateral_miss, side_of
 from campaigns.reentry.dynamics import Reckoning, Steering, Turn, exposure_of, from_planned_entry, velocity
-from campaigns.reentry.guidance.apollo_final_phase import OVERCONTROL, REFERENCE_LIFT_TO_DRAG
-from campaigns.reentry.guidance.reference_table import (
-    FELT,
-    LAST_SPEED,
-    STEERED,
-    BySpeed,
-    Influence,
-    by_loss,
-    by_speed,
-    clocked_range,
-)
+from campaigns.reentry.guidance import reference_table as stored
 from campaigns.reentry.inputs import CHOICES
 from mc_engine.lanes import acos, any_lane, asin, atan2, log, maximum, minimum, physics, replace, where
 from mc_engine.lanes.noise import normal_pair
@@ -48,28 +38,21 @@ def sensed(s, p, o, draws):
     place, _, force, pressure, _ = exposure_of(s, p, o)
     up, ahead, _ = from_planned_entry(s, p)
     v = norm(velocity(s))
-    sine = dot(velocity(s), place.up) / v
     wrong, stretch = p.accelerometer_bias, 1.0 + p.accelerometer_scale_error
     if any_lane(p.accelerometer_noise > 0.0):
         wrong = wrong + p.accelerometer_noise * normal_pair(draws, 0)[0]
+    in_line = axial_coefficient(force.drag, force.lift, p.cos_misaligned, p.sin_misaligned)
     return Sensed(
         speed=v + p.nav_speed_error,
         altitude=place.altitude + p.nav_altitude_error,
-        path=asin(bounded(sine, 1.0)) + p.nav_flight_path_angle_error,
+        path=asin(bounded(dot(velocity(s), place.up) / v, 1.0)) + p.nav_flight_path_angle_error,
         along=p.radius * atan2(ahead, up) + p.nav_range_error,
         climb=place.climb + p.nav_climb_error,
-        drag=stretch * (pressure * axial_coefficient(force.drag, force.lift, p.cos_misaligned, p.sin_misaligned))
-        + wrong,
+        drag=stretch * (pressure * in_line) + wrong,
         axial=stretch * (pressure * force.sensed) + wrong,
         load_by_axial=force.total / force.axial,
         load_by_drag=force.total / force.drag,
     )
-
-
-@physics
-def target_shift(p):
-    """Distance [m] by which the target lies beyond the end of the reference."""
-    return p.aim_down - p.planned_range
 
 
 @physics
@@ -79,8 +62,8 @@ def navigated_share(x, p, o):
     u - u_r = -(k_h dh + k_gamma dgamma + k_s ds) at equal speed; law 2 takes dh = -H_s (D - D_r) / D_r and dgamma =
     (h' - h'_r) / V.  Derived here for the source's three laws, of which it gives the outline alone.
     """
-    row = BySpeed(*by_speed(o.tables, p.reference, x.speed))
-    along = x.along - row.range - target_shift(p)
+    row = stored.BySpeed(*stored.by_speed(o.tables, p.reference, x.speed))
+    along = x.along - row.range - (p.aim_down - p.planned_range)  # its end is moved to the target
     if o.guidance == CHOICES.guidance.law1:
         high, tilt = x.altitude - row.altitude, x.path - row.path
     else:
@@ -97,10 +80,9 @@ def apollo_share(x, p, o):
 
     R = R_r + F1 (D - D_r) + F2 (h' - h'_r) [m] and L/D = 0.18 + K (to go - R) / F3, K = 4: R. Morth, R-532 (1966).
     """
-    row = Influence(*by_speed(o.tables, p.reference, x.speed))
+    row = stored.Influence(*stored.by_speed(o.tables, p.reference, x.speed))
     predicted = row.range + row.by_drag * (x.drag - row.drag) + row.by_climb * (x.climb - row.climb)
-    to_go = p.aim_down - x.along
-    wanted = REFERENCE_LIFT_TO_DRAG + OVERCONTROL * (to_go - predicted) / row.by_lift
+    wanted = stored.REFERENCE_LIFT_TO_DRAG + stored.OVERCONTROL * (p.aim_down - x.along - predicted) / row.by_lift
     return wanted / p.planned_lift_to_drag
 
 
@@ -110,15 +92,13 @@ def reckoned(t, kept, x, p, o):
 
     W = integral of n dt and the range [m] along W by trapezoids; derived here for the source's law 3.
     """
-    period = o.guidance_period
-    before = kept.lost <= 0.0
-    felt = x.axial > FELT
+    period, before = o.guidance_period, kept.lost <= 0.0
     # of the sample in which the threshold is passed, the part beyond it
-    part = (x.axial - FELT) / where(x.axial > kept.axial, x.axial - kept.axial, 1.0)
-    first = 0.5 * (x.axial + FELT) * bounded(part, 1.0) * period
-    lost = where(before, where(felt, first, 0.0), kept.lost + 0.5 * (x.axial + kept.axial) * period)
-    row = by_loss(o.tables, p.reference, lost)
-    by_clock = clocked_range(o.tables, p.reference, t)
+    part = (x.axial - stored.FELT) / where(x.axial > kept.axial, x.axial - kept.axial, 1.0)
+    first = where(x.axial > stored.FELT, 0.5 * (x.axial + stored.FELT) * bounded(part, 1.0) * period, 0.0)
+    lost = where(before, first, kept.lost + 0.5 * (x.axial + kept.axial) * period)
+    row = stored.by_loss(o.tables, p.reference, lost)
+    by_clock = stored.clocked_range(o.tables, p.reference, t)
     along = where(before, by_clock, kept.range + 0.5 * (row.range_rate + kept.rate) * period)
     excess = log(maximum(x.axial, 1e-6)) - row.log_axial
     return Reckoning(lost, along, row.range_rate, x.axial, excess)
@@ -131,31 +111,16 @@ def accelerometer_share(now, before, p, o):
     dh = -H_s (n - n_r) / n_r and h' = -H_s [rate of ln(n / n_r) + 2 (n - n_r) / V_r]: the logarithm of n ~ rho V^2
     differentiated in an exponential atmosphere, derived here.
     """
-    row = by_loss(o.tables, p.reference, now.lost)
+    row = stored.by_loss(o.tables, p.reference, now.lost)
     share = now.axial / row.axial - 1.0
     high = bounded(-SCALE_HEIGHT * share, LARGEST_CLIMB)
     growth = (now.excess - before.excess) / o.guidance_period
     climb = -SCALE_HEIGHT * (growth + 2.0 * (now.axial - row.axial) / row.speed)
     tilt = bounded(climb / row.speed, LARGEST_TILT)
-    along = now.range - row.range - target_shift(p)
+    along = now.range - row.range - (p.aim_down - p.planned_range)
     if o.guidance == CHOICES.guidance.law3:
         along = 0.0
     return -(row.k_altitude * high + row.k_path * tilt + row.k_range * along), row.speed
-
-
-@physics
-def commanded_share(t, kept, x, p, o):
-    """(vertical share of the lift before its limits, speed [m/s] by which the law goes, what law 3 keeps)."""
-    now = kept
-    if o.guidance == CHOICES.guidance.law3 or o.guidance == CHOICES.guidance.law3r:
-        now = reckoned(t, kept, x, p, o)
-        change, speed = accelerometer_share(now, kept, p, o)
-        share = p.planned_share + change
-    elif o.guidance == CHOICES.guidance.apollo:
-        share, speed = apollo_share(x, p, o), x.speed
-    else:
-        share, speed = p.planned_share + navigated_share(x, p, o), x.speed
-    return share, speed, now
 
 
 @physics
@@ -164,20 +129,24 @@ def control(t, s, m, p, o, draws):
     if o.guidance == CHOICES.guidance.none:
         return m
     x, kept = sensed(s, p, o, draws), m.steering
-    share, speed, reckoning = commanded_share(t, kept.reckoning, x, p, o)
+    # what law 3 keeps, the speed by which the law goes, the deceleration that it knows
+    reckoning, speed, felt, load = kept.reckoning, x.speed, x.drag, x.drag * x.load_by_drag
     if o.guidance == CHOICES.guidance.law3 or o.guidance == CHOICES.guidance.law3r:
-        felt, load = x.axial, x.axial * x.load_by_axial
+        reckoning = reckoned(t, kept.reckoning, x, p, o)
+        change, speed = accelerometer_share(reckoning, kept.reckoning, p, o)
+        share, felt, load = p.planned_share + change, x.axial, x.axial * x.load_by_axial
+    elif o.guidance == CHOICES.guidance.apollo:
+        share = apollo_share(x, p, o)
     else:
-        felt, load = x.drag, x.drag * x.load_by_drag
-    active = where((kept.active > 0.5) | (felt > STEERED), 1.0, 0.0)
-    working = (active > 0.5) & (speed > LAST_SPEED)
+        share = p.planned_share + navigated_share(x, p, o)
+    active = where((kept.active > 0.5) | (felt > stored.STEERED), 1.0, 0.0)
+    working = (active > 0.5) & (speed > stored.LAST_SPEED)
     share = where(working, share, p.planned_share)
     # a load above the limit calls for all the lift upwards, whatever the law wants
     share = where(load > p.load_limit, 1.0, share)
     inside = minimum(maximum(share, LEAST_SHARE), 1.0)
     side = where(active > 0.5, side_of(kept.side, lateral_miss(s, p), norm(velocity(s)), p), kept.side)
-    command = side * acos(inside) + p.bank_error
-    bank, rate = kept.turn.next_bank, kept.turn.next_rate
+    bank, rate, command = kept.turn.next_bank, kept.turn.next_rate, side * acos(inside) + p.bank_error
     next_bank, next_rate = followed(bank, rate, command, p.bank_lag, p.bank_rate_limit, o.guidance_period)
     steering = Steering(
         turn=Turn(t, where(p.bank_lag > 0.0, bank, next_bank), rate, next_bank, next_rate),  # without a lag at once

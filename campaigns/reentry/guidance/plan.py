@@ -73,10 +73,9 @@ def plan_of(**chosen: Any) -> Plan:
     i, settings, refusals = SimpleNamespace(), SimpleNamespace(), Refusals.none(1)
     for item in Inputs.declared:
         value = chosen.get(item.name, item.default)
-        if isinstance(item, Parameter):
-            setattr(i, item.symbol, np.array([value * item.si_factor]))
-        else:
-            setattr(settings, item.symbol, np.array([item.code(value)]))
+        is_parameter = isinstance(item, Parameter)
+        number = value * item.si_factor if is_parameter else item.code(value)
+        setattr(i if is_parameter else settings, item.symbol, np.array([number]))
     world = world_of(i, settings)
     planned = planned_entry(i, settings, world, entry_of(i, settings, world, refusals), refusals)
     plan = plans_of(i, settings, world, planned, airframe_of(i, settings, refusals))

@@ -1,4 +1,4 @@
-"""Design of the reference path and of its stored gains, once for all cases.  NumPy, SI.
+"""Design of the reference path and of its stored gains, once for all cases.  NumPy, SI, angles over ground.
 
 The planned vehicle flies the planned entry in the standard atmosphere, its bank held and its side force averaged out
 by reversals.  Along it the differences (altitude, flight-path angle, range) at equal speed are a linear system in
@@ -13,23 +13,21 @@ import numpy as np
 import scipy  # loads its packages when they are used
 
 from campaigns.reentry.air import sound_speed
-from campaigns.reentry.guidance.apollo_final_phase import influence_rows
+from campaigns.reentry.guidance import reference_table as stored
 from campaigns.reentry.guidance.plan import Plan
-from campaigns.reentry.guidance.reference_table import FELT, LAST_SPEED, ROWS, SPREAD, STEERED, Header
-from campaigns.reentry.guidance.vinh import gravity, rates
 from campaigns.reentry.inputs import CHOICES
 from campaigns.reentry.vehicles import apollo_shares
 from mc_engine.errors import ModelError
 from mc_engine.model import Refusals
 from mc_engine.physics.aerodynamics import axial_coefficient
 from mc_engine.physics.atmosphere import us76_logarithm, us76_of_array
+from mc_engine.physics.constants import EQUATORIAL_RADIUS, J2_EARTH
 from mc_engine.physics.frames import over_ellipsoid
 
 MOST_PLANS = 16  # different plans among the cases prepared at once: a grid, but no random draws
 MOST_EVALUATIONS = 15_000  # of the rates of one reference path; the planned entries of the campaigns take some 3000
 _KILOMETRE, _DEGREE = 1e3, np.pi / 180.0
 _SCALES = np.array([_KILOMETRE, _DEGREE, _KILOMETRE])
-
 
 # Riccati weights in km, degrees, km: final S, running Q on the altitude, R on the vertical share of the lift
 Weights = namedtuple("Weights", "final altitude control")
@@ -42,6 +40,33 @@ PROFILE_SET = Weights((1.0 / 5.0**2, 1.0 / 3.0**2, 0.0), 1e-11 * _KILOMETRE**2, 
 # deceleration along the body axis
 Reference = namedtuple("Reference", "t state altitude climb drag axial")
 R, LATITUDE, SPEED, PATH, ALONG, LOST = 0, 2, 3, 4, 6, 7  # rows of the state
+
+
+def gravity(r, latitude, mu, j2=J2_EARTH):
+    """(inward, northward) acceleration [m/s^2] by a point mass with J2."""
+    q = j2 * (EQUATORIAL_RADIUS / r) ** 2
+    s, c = np.sin(latitude), np.cos(latitude)
+    return mu / r**2 * (1.0 - 1.5 * q * (3.0 * s * s - 1.0)), -3.0 * mu / r**2 * q * s * c
+
+
+def rates(r, latitude, v, path, heading, drag, lift, bank, g_in, g_north, omega):
+    """Rates (SI) of (r, longitude, latitude, v, path, heading); drag, lift, g_in, g_north are accelerations.
+
+    The motion of `dynamics.rhs`, but singular in vertical flight, at rest and over the poles.  N. X. Vinh,
+    A. Busemann, R. D. Culp, Hypersonic and Planetary Entry Flight Mechanics (1980), chapter 2, with the heading from
+    north, clockwise (Vinh: from east, counter-clockwise).
+    """
+    s, c = np.sin(path), np.cos(path)
+    sh, ch = np.sin(heading), np.cos(heading)
+    sl, cl = np.sin(latitude), np.cos(latitude)
+    turn = omega**2 * r
+    # of V path' and V heading', without and with the turning of the planet
+    up = lift * np.cos(bank) - g_in * c - g_north * s * ch + v * v * c / r
+    up = up + 2.0 * omega * v * cl * sh + turn * cl * (c * cl + s * sl * ch)
+    right = lift * np.sin(bank) / c - g_north * sh / c + v * v * c * sh * sl / (cl * r)
+    right = right - 2.0 * omega * v * (s / c * cl * ch - sl) + turn * sl * cl * sh / c
+    faster = -drag - g_in * s + g_north * c * ch + turn * cl * (s * cl - c * sl * ch)
+    return v * s, v * c * sh / (r * cl), v * c * ch / r, faster, up / v, right / v
 
 
 def height(plan: Plan, state):
@@ -76,7 +101,7 @@ def fly_reference(plan: Plan, rows: int = 4000) -> Reference:
         if next(evaluated) > MOST_EVALUATIONS:
             raise ModelError("the reference path of the planned entry cannot be integrated; check the plan_ parameters")
         seven, _, axial = motion(plan, state, plan.share)
-        return [*seven, axial if axial > FELT else 0.0]
+        return [*seven, axial if axial > stored.FELT else 0.0]
 
     def low(t, state):
         return height(plan, state)[0] - plan.end
@@ -102,10 +127,10 @@ def fly_reference(plan: Plan, rows: int = 4000) -> Reference:
 
 def steered_part(path: Reference) -> Reference:
     """Where the laws command: from STEERED [m/s^2] down to LAST_SPEED [m/s]."""
-    first = int(np.argmax(path.drag > STEERED))
-    if path.drag[first] <= STEERED:
+    first = int(np.argmax(path.drag > stored.STEERED))
+    if path.drag[first] <= stored.STEERED:
         raise ModelError("the planned entry never has 0.15 g of drag, so that no law could steer")
-    last = int(np.argmax((path.state[SPEED] < LAST_SPEED) & (path.t > path.t[first])))
+    last = int(np.argmax((path.state[SPEED] < stored.LAST_SPEED) & (path.t > path.t[first])))
     # the last row is below, so that law 3 gets there
     return Reference(*(column[..., first : last + 1 if last else path.t.size] for column in path))
 
@@ -152,21 +177,19 @@ def riccati_gains(lost: np.ndarray, a: np.ndarray, b: np.ndarray, weights: Weigh
     return np.einsum("ni,nij->nj", b, p) / weights.control / _SCALES
 
 
-# index at which each case's reference path begins in the tables, and its range [m]; both 0 without one
-StoredReferences = namedtuple("StoredReferences", "start range tables")
+def stored_references(
+    plans: Plan, asked: np.ndarray, first: int, refusals: Refusals
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(index of each case's reference path in the tables, its range [m], both 0 without one; the tables), SI.
 
-
-def stored_references(plans: Plan, asked: np.ndarray, first: int, refusals: Refusals) -> StoredReferences:
-    """The reference paths of the plans (float64[n] each), one for all cases of the same plan.
-
-    asked : bool[n], cases with a law;  first : index at which the first reference begins.  Cases whose plan has no
-    reference path join `refusals`.
+    plans : of float64[n]; cases of the same one share a path, and those whose plan has none join `refusals`
+    asked : bool[n], cases with a law;  first : index at which the first path begins
     """
     columns = np.array([np.broadcast_to(column, asked.shape) for column in plans])
     start, along, tables = np.zeros(asked.size), np.zeros(asked.size), [np.empty(0)]
     asked = asked & ~refusals.mask
     if not asked.any():
-        return StoredReferences(start, along, tables[0])
+        return start, along, tables[0]
     distinct, which = np.unique(columns[:, asked], axis=1, return_inverse=True)
     # an error and not a refusal: what a case comes to must not depend on the cases it is prepared with
     if distinct.shape[1] > MOST_PLANS:
@@ -180,10 +203,10 @@ def stored_references(plans: Plan, asked: np.ndarray, first: int, refusals: Refu
         if isinstance(reference, str):
             refusals.reason[mine] = reference
         else:
-            start[mine] = first + sum(stored.size for stored in tables)
-            along[mine] = Header(*reference[: len(Header._fields)]).range
+            start[mine] = first + sum(table.size for table in tables)
+            along[mine] = stored.Header(*reference[: len(stored.Header._fields)]).range
             tables.append(reference)
-    return StoredReferences(start, along, np.concatenate(tables))
+    return start, along, np.concatenate(tables)
 
 
 @lru_cache(maxsize=64)
@@ -192,7 +215,7 @@ def reference_table_of(plan: Plan) -> np.ndarray | str:
     try:
         path = fly_reference(plan)
         if plan.law == CHOICES.guidance.apollo:
-            speed, columns, by_loss = *influence_rows(), None
+            speed, columns, by_loss = *stored.influence_rows(), None
         else:
             weights = PROFILE_SET if plan.law == CHOICES.guidance.law2 else RANGE_SET
             speed, columns, by_loss = _path_and_gains(plan, path, weights)
@@ -200,7 +223,7 @@ def reference_table_of(plan: Plan) -> np.ndarray | str:
         return str(error)
     speed_density, speed_rows = _resampled(speed[0] - speed, columns)
     lost_density, lost_rows = _resampled(*by_loss) if by_loss else (0.0, np.empty(0))
-    header = Header(
+    header = stored.Header(
         first_speed=speed[0],
         speed_density=speed_density,
         lost_density=lost_density,
@@ -219,15 +242,15 @@ def _path_and_gains(plan: Plan, path: Reference, weights: Weights):
     _, _, _, speed, _, _, whole, lost = path.state
     over = [path.axial, np.log(path.axial), speed, np.gradient(whole, path.t), whole]
     # before the laws command, the gains are those of their first row
-    stored = [np.interp(path.t[felt], part.t, gain) for gain in gains]
-    by_loss = lost[felt], [*(column[felt] for column in over), *stored]
+    held = [np.interp(path.t[felt], part.t, gain) for gain in gains]
+    by_loss = lost[felt], [*(column[felt] for column in over), *held]
     return first, [part.altitude, angle, along, part.drag, part.climb, *gains], by_loss
 
 
 def _clock(path: Reference) -> dict[str, float]:
     """The range by the clock until the air is felt: a parabola through the entry, with range and rate of its end.
 
-    SI; derived here: s = along + rate (t - end) + bend (t - end)^2 with s(0) = 0.
+    SI; derived here: s = range + rate (t - end) + bend (t - end)^2 with s(0) = 0.
     """
     k = max(2, int(np.argmax(path.state[LOST] > 0.0)))
     t, along = path.t[: k + 1], path.state[ALONG, : k + 1]
@@ -238,6 +261,6 @@ def _clock(path: Reference) -> dict[str, float]:
 
 def _resampled(lost: np.ndarray, columns: list[np.ndarray]) -> tuple[float, np.ndarray]:
     """(rows per unit of the logarithm, the rows of a table) of columns over a rising speed lost."""
-    top = np.log1p(lost[-1] / SPREAD)
-    nodes = SPREAD * np.expm1(np.linspace(0.0, top, ROWS))
-    return float((ROWS - 1) / top), np.ravel([np.interp(nodes, lost, column) for column in columns], order="F")
+    top = np.log1p(lost[-1] / stored.SPREAD)
+    nodes = stored.SPREAD * np.expm1(np.linspace(0.0, top, stored.ROWS))
+    return float((stored.ROWS - 1) / top), np.ravel([np.interp(nodes, lost, column) for column in columns], order="F")

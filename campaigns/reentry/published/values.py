@@ -1,4 +1,4 @@
-"""Our values of published numbers on air, single entries and the autopilot's lead design; `closed_forms` has others.
+"""Our values of published numbers on air, entries, guidance and the autopilot's lead design; `closed_forms` has others.
 
 The records name these functions; each returns its value in the unit of the record.
 """
@@ -11,7 +11,7 @@ import numpy as np
 from campaigns.reentry.autopilot.lead_compensator import crossover_of, margins_of, ratio_of_lead, stage
 from campaigns.reentry.closed_forms import GROUND_DENSITY, SCALE_M, circular_speed, glide_angle_deg, steep_load_g
 from campaigns.reentry.critical_trajectories import critical_periapses
-from campaigns.reentry.guidance.apollo_final_phase import FLOWN
+from campaigns.reentry.guidance.reference_table import FLOWN
 from campaigns.reentry.model import MODEL
 from mc_engine import load_campaign
 from mc_engine.flight.flight import chosen_case, chosen_cases, chosen_history
@@ -35,9 +35,29 @@ STARDUST: dict[str, Any] = {
     "entry_latitude_deg": 42.3,
     "stop_altitude_km": 20.0,
 }
+# standard deviations of independent normal draws; 3σ of the planar baseline: 15 m/s, 0.15°, density 30 % (constant
+# factor), C_D and L/D 10 %, mass 2 %
+PLANAR_SIGMA = {
+    "entry_speed_error_m_s": 5.0,
+    "entry_flight_path_angle_error_deg": 0.05,
+    "density_factor": 0.1,
+    "cd_factor": 0.1 / 3,
+    "ld_factor": 0.1 / 3,
+    "mass_factor": 0.02 / 3,
+}
+STARDUST_SIGMA = {
+    "entry_speed_error_m_s": 5.0 / 3.0,
+    "entry_flight_path_angle_error_deg": 0.08 / 3.0,
+    "density_deviation": 1.0,
+    "cd_factor": 0.05 / 3.0,
+    "mass_factor": 0.01 / 3.0,
+}
 
 
-# ---- air and numbers of cases
+def off_nominal(sigma: dict[str, float], cases: int, seed: int = 2003) -> dict[str, Any]:
+    """Normal draws of each dispersed input, factors about one and errors about zero, float64[cases]."""
+    rng = np.random.default_rng(seed)
+    return {name: rng.normal(1.0 if name.endswith("factor") else 0.0, size, cases) for name, size in sigma.items()}
 
 
 def density_kg_m3(altitude_km: float) -> float:
@@ -53,9 +73,6 @@ def cases_without_failure(probability: float, confidence: float) -> int:
 def failure_probability(cases: int, confidence: float) -> float:
     """Upper bound of the failure probability after no failure: C. J. Clopper, E. S. Pearson, Biometrika 26 (1934)."""
     return 1.0 - float(lower_bound(cases, cases, confidence))
-
-
-# ---- ballistic entries
 
 
 def ballistic(b: Any) -> dict[str, Any]:
@@ -87,9 +104,6 @@ def excess_of_gravity_pct(which: str) -> float:
     return float(getattr(100.0 * (loads / steep_load_g(6500.0, angle_deg) - 1.0), which)())
 
 
-# ---- Stardust
-
-
 def stardust_mach_time_s(mach: float) -> float:
     """Time [s] after entry at which Stardust has slowed to a Mach number, constant hypersonic drag coefficient."""
     history = chosen_history(MODEL, STARDUST, rows=8001)
@@ -97,59 +111,33 @@ def stardust_mach_time_s(mach: float) -> float:
     return float(np.interp(-mach, -history["mach"][fastest:], history["t_s"][fastest:]))
 
 
-def stardust_at_rest_excess_pct() -> float:
-    """How much larger [%] the load of Stardust is over a sphere at rest, its inertial speed taken as relative."""
-    at_rest = chosen_case(MODEL, STARDUST | AT_REST | EXACT)["peak_load_g"]
-    return 100.0 * (float(at_rest) / _stardust_load_g() - 1.0)
+def stardust_excess_pct(model: str) -> float:
+    """How much larger [%] than ours the load of Stardust is by a simpler model.
 
-
-def stardust_constant_angle_excess_pct() -> float:
-    """How much larger [%] its load is by NACA Rep. 1381, eq. (15), at a constant angle."""
-    return 100.0 * (steep_load_g(12_900.0, 8.2) / _stardust_load_g() - 1.0)
-
-
-@lru_cache
-def _stardust_load_g() -> float:
-    return float(chosen_case(MODEL, STARDUST | EXACT)["peak_load_g"])
+    "at rest": over a sphere, its inertial speed taken as relative;  "constant angle": NACA Rep. 1381, eq. (15)
+    """
+    if model == "at rest":
+        load = chosen_case(MODEL, STARDUST | AT_REST | EXACT)["peak_load_g"]
+    else:
+        load = steep_load_g(12_900.0, 8.2)
+    return 100.0 * (float(load) / float(chosen_case(MODEL, STARDUST | EXACT)["peak_load_g"]) - 1.0)
 
 
 def stardust_load_three_sigma_g() -> float:
     """3σ [g] of the largest load under 3σ of 5 m/s, 0.08°, C_D 5 %, mass 1 %, and the slow density error."""
-    n, rng = 2000, np.random.default_rng(2003)
-    flown = chosen_cases(
-        MODEL,
-        {
-            **STARDUST,
-            "entry_speed_error_m_s": rng.normal(0.0, 5.0 / 3.0, n),
-            "entry_flight_path_angle_error_deg": rng.normal(0.0, 0.08 / 3.0, n),
-            "density_deviation": rng.normal(0.0, 1.0, n),
-            "cd_factor": rng.normal(1.0, 0.05 / 3.0, n),
-            "mass_factor": rng.normal(1.0, 0.01 / 3.0, n),
-        },
-    )
-    return 3.0 * float(flown["peak_load_g"].std())
-
-
-# ---- glide, aerobraking
+    return 3.0 * float(chosen_cases(MODEL, STARDUST | off_nominal(STARDUST_SIGMA, 2000))["peak_load_g"].std())
 
 
 def equilibrium_glide() -> dict[str, Any]:
     """Inputs of an equilibrium glide, L/D 1, from 80 km and 0.95 of circular speed; the area [m^2] follows."""
     speed, radius = 0.95 * float(circular_speed(80.0)), WGS84_RADIUS + 80e3
     density = GROUND_DENSITY * np.exp(-80e3 / SCALE_M)
-    return TEXTBOOK | {
-        "mass_kg": 1.0,
-        # lift carries what the circular motion does not
-        "reference_area_m2": 2.0 * (MU_EARTH / radius**2 - speed**2 / radius) / (density * speed**2),
-        "lift_coefficient": 1.0,
-        "drag_coefficient": 1.0,
-        "bank_deg": 0.0,
-        "entry_altitude_km": 80.0,
-        "entry_speed_m_s": speed,
-        "entry_flight_path_angle_deg": glide_angle_deg(0.95, radius),
-        "on_exit": "continue",
-        "stop_altitude_km": 0.0,
-    }
+    # lift carries what the circular motion does not
+    area = 2.0 * (MU_EARTH / radius**2 - speed**2 / radius) / (density * speed**2)
+    vehicle = ballistic(1.0) | {"reference_area_m2": area, "lift_coefficient": 1.0, "bank_deg": 0.0}
+    angle = glide_angle_deg(0.95, radius)
+    start = {"entry_altitude_km": 80.0, "entry_speed_m_s": speed, "entry_flight_path_angle_deg": angle}
+    return TEXTBOOK | vehicle | start | {"on_exit": "continue", "stop_altitude_km": 0.0}
 
 
 def flown_glide_km() -> float:
@@ -162,9 +150,6 @@ def flown_glide_km() -> float:
 def periapsis_km(trajectory: str) -> float:
     """Vacuum periapsis [km] below which one pass of aerobraking ends in "capture" or in "entry"; eqs (17), (18)."""
     return float(getattr(critical_periapses(load_campaign("reentry/aerobraking").nominal), trajectory))
-
-
-# ---- Apollo final phase
 
 
 def apollo_range_to_go_km(speed_m_s: float) -> float:
@@ -180,7 +165,34 @@ def apollo_range_to_go_km(speed_m_s: float) -> float:
     return float(rows[0, 3] + np.interp(speed_m_s, v, distance) / 1e3)
 
 
-# ---- lead design
+# ---- reconstructed guidance laws on the planar baseline: the same 1200 dispersed cases for each, ideal sensors
+
+
+@lru_cache
+def _flown(law: str) -> dict[str, np.ndarray]:
+    """Columns of the dispersed cases under a guidance law, "none" for the open loop."""
+    return chosen_cases(MODEL, PLANAR | off_nominal(PLANAR_SIGMA, 1200) | {"plan": "given", "guidance": law})
+
+
+def range_spread_km(law: str) -> float:
+    """Standard deviation [km] of the range."""
+    return float(_flown(law)["downrange_km"].std())
+
+
+def range_bias_km(law: str) -> float:
+    """Distance [km] of the mean range from that of the nominal case."""
+    nominal = chosen_case(MODEL, {**PLANAR, "plan": "given"})["downrange_km"]
+    return abs(float(_flown(law)["downrange_km"].mean()) - float(nominal))
+
+
+def spread_reduction_pct(law: str) -> float:
+    """By how much [%] the spread of the range is smaller than in open loop."""
+    return 100.0 * (1.0 - range_spread_km(law) / range_spread_km("none"))
+
+
+def largest_load_g(law: str) -> float:
+    """Largest load [g] of all cases."""
+    return float(_flown(law)["peak_load_g"].max())
 
 
 def ogata_plant(w: Any) -> Any:

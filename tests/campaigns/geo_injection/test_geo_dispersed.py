@@ -67,8 +67,8 @@ STAGED = {
 
 @pytest.mark.parametrize("name", STAGED)
 def test_the_staged_procedure_goes_over_the_orbits_of_the_source_unless_others_are_given(name):
-    item, stages = staged_over(name)
-    first_burn_s = item.time_unit * stages[0].burn.duration
+    item, burns = staged_over(name)
+    first_burn_s = item.time_unit * burns[0].duration
     assert fly_one(method="staged", **STAGED[name])["burn_out_1_s"] == pytest.approx(first_burn_s, abs=1e-3)
 
 

@@ -1,5 +1,6 @@
 """The source's single burns: the example of table 1, and the burns between its stated orbits."""
 
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -7,8 +8,7 @@ import pytest
 from geo_sequences import GEO, MASS, MU, PARKING, SOURCE, sequence, staged_over
 
 from campaigns.geo_injection.design.coast import coast
-from campaigns.geo_injection.design.single_burn import Stage, circle, fly_shortest, rise_guess
-from campaigns.geo_injection.design.staged import rising
+from campaigns.geo_injection.design.staged import Stage, circle_reached, fly_shortest, rise_guess, rising
 from campaigns.geo_injection.published.values import avoidance, burn_s
 
 
@@ -22,7 +22,7 @@ def test_the_source_s_guess_for_burns_between_ellipses_leads_to_the_same_apogee_
     a, e, i = 1e3 * transfer[0] / PARKING, transfer[1], np.radians(transfer[2])
     speed = np.sqrt((1 - e) / ((1 + e) * a))
     apogee = np.array([-a * (1 + e), 0.0, 0.0, 0.0, -speed * np.cos(i), -speed * np.sin(i)])
-    stage = Stage(apogee, mass, problem.thrust, problem.flow, circle(problem.ratio))
+    stage = Stage(apogee, mass, problem.thrust, problem.flow, partial(circle_reached, problem.ratio))
     change = np.array([0.0, -np.sqrt(1.0 / problem.ratio), 0.0]) - apogee[3:]
     by_impulse = fly_shortest(stage, change, np.zeros(3), 600.0 / unit, -300.0 / unit).duration
     guess = rise_guess((problem.ratio + apogee[0]) * mass / problem.thrust)
@@ -34,14 +34,15 @@ def test_the_source_s_guess_for_burns_between_ellipses_leads_to_the_same_apogee_
 
 @pytest.mark.parametrize("name", SOURCE)
 def test_staged_burns_make_one_continuous_flight_to_the_geostationary_circle(name):
-    item, stages = staged_over(name)
-    end = stages[-1].burn.end
+    item, burns = staged_over(name)
+    end = burns[-1].end
     assert np.linalg.norm(end[:3]) * PARKING == pytest.approx(GEO, abs=0.01)
     assert np.linalg.norm(end[3:6]) * item.speed_unit == pytest.approx(np.sqrt(MU / GEO), abs=1e-6)
-    for stage, after in pairwise(stages):
-        wait = np.array([after.ignition - stage.ignition - stage.burn.duration])
-        assert after.burn.start[:6] == pytest.approx(coast(stage.burn.end, wait)[0, :6], abs=1e-9)
-        assert after.burn.ignition == pytest.approx(-0.5 * after.burn.duration, abs=1e-9)
+    for burn, after in pairwise(burns):
+        wait = np.array([after.ignition - burn.ignition - burn.duration])
+        assert after.start[:6] == pytest.approx(coast(burn.end, wait)[0, :6], abs=1e-9)
+        middle = coast(after.start, np.array([0.5 * after.duration]))[0]  # had the burn not begun: at an apsis
+        assert middle[:3] @ middle[3:6] == pytest.approx(0.0, abs=1e-9)
 
 
 # [s] of independent solutions: first burns ignited on the node, second burns centred on the printed perigee

@@ -1,10 +1,13 @@
 """The filter against matrices, and its own account of its errors against the errors."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from servicing_twin import MU, R0, RATE
 
+from campaigns.geo_servicing.corrections import Burn
 from campaigns.geo_servicing.navigation import Error, Estimate, burnt, fixed, hill, propagated, single_fix
 
 ORDER = [(0, 0), (0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)]
@@ -79,10 +82,10 @@ def test_a_fix_is_the_textbooks_update(seed):
 
 
 def test_a_burn_adds_what_it_did_differently():
-    e = some_estimate(1)
-    after = burnt(e, 1e-3, -2e-3, 3.0, 0.005, 0.01)
-    assert after.u == e.u - 1e-3
-    assert after.w == e.w + 2e-3
+    e, settings = some_estimate(1), SimpleNamespace(thrust=2.0, assumed_thrust=0.005, assumed_pointing=0.01)
+    after = burnt(e, Burn(dv=-3.0, outward=0.02, ahead=-1.96, across=0.5), settings)
+    assert after.u == pytest.approx(e.u - 0.03)
+    assert after.w == pytest.approx(e.w - 0.06)
     assert after.puu - e.puu == pytest.approx(0.03**2)
     assert after.pww - e.pww == pytest.approx(0.015**2)
 

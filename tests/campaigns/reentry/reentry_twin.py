@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from campaigns.reentry.guidance.vinh import gravity, rates
+from campaigns.reentry.guidance.reference import gravity, rates
 
 MU, RADIUS, J2 = 3.986004418e14, 6_378_137.0, 1.08262668e-3
 GRAVITY_RADIUS = 6_378_136.3  # that J2 belongs to

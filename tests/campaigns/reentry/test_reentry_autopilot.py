@@ -8,16 +8,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from campaigns.reentry.autopilot.gains import STEEPEST, STEPS, bank_design, pitch_design, planned_profile
 from campaigns.reentry.autopilot.lead_compensator import design_lead, margins_of, short_period
-from campaigns.reentry.autopilot.model import air_at, bank_command, pitch_gains
+from campaigns.reentry.autopilot.model import (
+    STEEPEST,
+    STEPS,
+    air_at,
+    bank_command,
+    pitch_design,
+    pitch_gains,
+    planned_profile,
+)
 from campaigns.reentry.published.values import ogata_plant
 from mc_engine.flight.flight import fly_history, prepare, settings_of
 from tests.campaigns.model_flights import ModelFlights
 
 FLIGHTS = ModelFlights("campaigns.reentry.autopilot")
 MODEL, NOMINAL, fly_one = FLIGHTS.model, FLIGHTS.nominal, FLIGHTS.one
-CODES = {setting.symbol: setting.code(setting.default) for setting in MODEL.settings}
+CODES = SimpleNamespace(**{setting.symbol: setting.code(setting.default) for setting in MODEL.settings})
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +72,7 @@ def test_the_margin_asked_for_is_reached_on_any_short_period(stiffness, bandwidt
 
 def margin_at(lead, pressure, factor=1.0, inertia=1.0):
     """Phase margin [deg] of a compensator at a pressure, with other stability and inertia than assumed."""
-    stiffness = -pressure * CODES["area"] * CODES["diameter"] * CODES["c_m_alpha"] * factor / CODES["inertia_pitch"]
+    stiffness = -pressure * CODES.area * CODES.diameter * CODES.c_m_alpha * factor / CODES.inertia_pitch
     plant = short_period(stiffness / inertia)
     return np.degrees(margins_of(lambda w: lead.response(w) * plant(w) / inertia).phase)
 
@@ -81,7 +88,7 @@ def test_gains_that_follow_the_pressure_keep_the_margin_everywhere():
 def test_the_pitch_loop_halves_what_a_moment_does():
     """Angle over moment at rest: 1 / (gain + stiffness), without an autopilot 1 / stiffness; at large pressure."""
     _, gain, lead = pitch_design(CODES, 12e3)
-    stiffness = gain - CODES["bandwidth"] ** 2
+    stiffness = gain - CODES.bandwidth**2
     assert lead.gain * lead.zero / lead.pole == pytest.approx(gain, rel=1e-12)
     assert stiffness / (gain + stiffness) == pytest.approx(0.5, abs=0.05)
 
@@ -121,7 +128,7 @@ def twin(inputs, duration, o):
     seconds = np.arange(len(profile))
     i = NOMINAL | inputs
     pitch, roll = 7000.0 * i["inertia_pitch_factor"], 8000.0 * i["inertia_roll_factor"]
-    bank = bank_design(CODES)
+    bank = design_lead(short_period(0.0), CODES.bandwidth**2, CODES.phase_margin)
     command = SimpleNamespace(reversal_period=60.0, commanded_rate=np.radians(10.0), bank_amplitude=np.radians(60.0))
 
     def rates(t, y):

@@ -48,7 +48,7 @@ def test_between_samples_the_rate_goes_over_its_limit_by_less_than_a_third(bank,
 
 
 def test_the_side_changes_only_where_the_miss_leaves_its_band():
-    p = SimpleNamespace(speed=8000.0, reversal_floor=1e3, reversal_width=40e3)
+    p = SimpleNamespace(relative_speed=8000.0, reversal_floor=1e3, reversal_width=40e3)
     fast, slow = 8000.0, 800.0
     assert side_of(1.0, 40.9e3, fast, p) == 1.0
     assert side_of(1.0, 41.1e3, fast, p) == -1.0  # too far right: lift to the left

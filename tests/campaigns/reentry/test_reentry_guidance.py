@@ -6,8 +6,7 @@ from guidance_twin import Stored, fly_guided
 from reentry_flights import assert_same_bits_alone, fly_cases, fly_one, history
 
 from campaigns.reentry.guidance.plan import plan_of
-from campaigns.reentry.published.laws import off_nominal
-from campaigns.reentry.published.values import PLANAR
+from campaigns.reentry.published.values import PLANAR, PLANAR_SIGMA, off_nominal
 
 PLANNED = PLANAR | {"plan": "given"}
 REFERENCE_KM = 2548.676
@@ -17,7 +16,7 @@ LAWS = ("law1", "law2", "law2r", "law3", "law3r", "apollo")
 @pytest.fixture(scope="module")
 def flown():
     """Columns by law, all on the same cases."""
-    cases = off_nominal(1200, 2003)
+    cases = off_nominal(PLANAR_SIGMA, 1200)
     return {law: fly_cases(**PLANNED, **cases, guidance=law) for law in ("none", *LAWS)}
 
 
@@ -42,7 +41,7 @@ def test_law_2_with_range_is_as_good_as_law_1_and_law_3_is_not(flown):
 @pytest.mark.parametrize("law", ["law2", "law3"])
 def test_since_the_miss_is_there_before_the_air_is_felt(law):
     """With entry errors alone: the distance over ground at 80 km, where the drag is 0.15 g, tells the later miss."""
-    cases = {name: values for name, values in off_nominal(300, 8).items() if name.startswith("entry")}
+    cases = {name: values for name, values in off_nominal(PLANAR_SIGMA, 300, 8).items() if name.startswith("entry")}
     early = fly_cases(**PLANNED, **cases, stop_altitude_km=80.0)["downrange_km"]
     landed = fly_cases(**PLANNED, **cases, guidance=law)["downrange_km"]
     assert np.corrcoef(early, landed)[0, 1] > 0.99
@@ -109,7 +108,10 @@ def test_a_load_above_the_limit_calls_for_all_the_lift():
 
 
 def test_dispersed_guided_cases_have_the_bits_of_each_alone():
-    cases = off_nominal(24, 5) | {"bank_lag_s": np.linspace(0.0, 2.0, 24), "accelerometer_noise_g": np.full(24, 1e-3)}
+    cases = off_nominal(PLANAR_SIGMA, 24, 5) | {
+        "bank_lag_s": np.linspace(0.0, 2.0, 24),
+        "accelerometer_noise_g": np.full(24, 1e-3),
+    }
     together = fly_cases(**PLANNED, guidance="law3r", **cases)
     assert_same_bits_alone(together, (0, 9, 23), each=cases, **PLANNED, guidance="law3r")
 
@@ -126,7 +128,7 @@ TURNING |= {"plan": "given", "target_downrange_km": 2647.561, "bank_lag_s": 1.5}
 
 @pytest.mark.parametrize("law", ["law1", "law2r", "law3r", "apollo"])
 def test_over_the_turning_earth_reversals_bring_the_lift_back_to_the_target(law):
-    cases = off_nominal(200, 11) | {"entry_heading_error_deg": np.linspace(-0.05, 0.05, 200)}
+    cases = off_nominal(PLANAR_SIGMA, 200, 11) | {"entry_heading_error_deg": np.linspace(-0.05, 0.05, 200)}
     flown = fly_cases(**TURNING, **cases, guidance=law)
     assert set(flown["status"]) == {"ok"}
     assert np.abs(flown["crossrange_km"]).max() < 6.0

@@ -62,7 +62,7 @@ def test_errors_are_added_to_the_planned_entry_and_leave_its_frame_alone():
         entry_latitude_deg=30.1, entry_longitude_deg=0.1, entry_speed_m_s=7810.0, entry_flight_path_angle_deg=-1.9,
         entry_heading_deg=91.0, entry_radius_km=1e-3 * np.sqrt(sum(wrong[axis] ** 2 for axis in "xyz")),
     )  # fmt: skip
-    for name in ("x", "y", "z", "vx", "vy", "vz", "speed", "path"):
+    for name in ("x", "y", "z", "vx", "vy", "vz", "relative_speed", "relative_flight_path_angle"):
         assert wrong[name] == pytest.approx(right[name], rel=1e-12, abs=1e-6), name
     for name in ("ex", "ey", "ez", "fx", "fy", "fz", "nx", "ny", "nz", "exit", "heading"):
         assert wrong[name] == planned[name], name

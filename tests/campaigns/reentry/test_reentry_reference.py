@@ -6,7 +6,6 @@ from reentry_flights import fly_one, history
 from scipy.integrate import solve_ivp
 
 from campaigns.reentry.guidance import reference
-from campaigns.reentry.guidance.apollo_final_phase import FLOWN
 from campaigns.reentry.guidance.plan import plan_of
 from campaigns.reentry.guidance.reference import (
     ALONG,
@@ -26,6 +25,7 @@ from campaigns.reentry.guidance.reference import (
 )
 from campaigns.reentry.guidance.reference_table import (
     COLUMNS,
+    FLOWN,
     LOST_TABLE,
     ROWS,
     BySpeed,
