@@ -37,17 +37,22 @@ def kepler(r: np.ndarray, v: np.ndarray, dt: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _anomaly_difference(m: np.ndarray, cosine: np.ndarray, sine: np.ndarray) -> np.ndarray:
-    """Real x of x - cosine sin x + sine (1 - cos x) = m: Newton's steps inside a bracket, which closes; eq. (21)."""
+    """Real x of x - cosine sin x + sine (1 - cos x) = m: Newton's steps inside a bracket, which closes; eq. (21).
+
+    Each row stops by itself, so that no case depends on the ones beside it.
+    """
     e = np.hypot(cosine, sine)
     low, high = m - 2.0 * e, m + 2.0 * e
     x = m + 0.0 * e
+    moving = np.full(x.shape, True)
     for _ in range(60):
         f = x - cosine * np.sin(x) + sine * (1.0 - np.cos(x)) - m
         low, high = np.where(f < 0.0, x, low), np.where(f < 0.0, high, x)
         better = x - f / (1.0 - cosine * np.cos(x) + sine * np.sin(x))
         inside = (better >= low) & (better <= high)
-        x, before = np.where(inside, better, 0.5 * (low + high)), x
-        if not np.any(np.abs(x - before) > 1e-15 * (1.0 + np.abs(x))):
+        x, before = np.where(moving, np.where(inside, better, 0.5 * (low + high)), x), x
+        moving &= np.abs(x - before) > 1e-15 * (1.0 + np.abs(x))
+        if not moving.any():
             break
     return x
 
