@@ -79,8 +79,8 @@ def _first_state(i: SimpleNamespace, inertia, coupling, refusals: Refusals) -> d
     errors = np.array([i.initial_attitude_error_x, i.initial_attitude_error_y, i.initial_attitude_error_z])
     q = product(Quaternion(*(q / size)), Quaternion(*rotation_quaternion(errors)))
     w = np.array([i.initial_omega_x, i.initial_omega_y, i.initial_omega_z])
-    h = np.einsum("nab,bn->an", inertia, w)
-    psi = np.einsum("nam,an->mn", coupling, w)
+    # term by term: the order of NumPy's einsum follows the number of cases
+    h, psi = (sum(matrix[:, a].T * w[a] for a in range(3)) for matrix in (inertia, coupling))  # J is symmetric
     rows = q._asdict() | {f"momentum_{axis}": h[a] for a, axis in enumerate(AXES)}
     return rows | {f"modal_momentum_{mode}": psi[mode - 1] for mode in MODES}
 

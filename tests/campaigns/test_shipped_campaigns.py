@@ -1,7 +1,12 @@
 """Every shipped campaign can be loaded, and says where its numbers come from."""
 
+import numpy as np
+import pytest
+
 from mc_engine import load_campaign
 from mc_engine.campaign.search import list_campaigns
+from mc_engine.model import load_model
+from mc_engine.model.preparation import prepare
 from reports.run.history_bands import OUTER, outer_percentile
 
 MAIN = ("deorbit", "flexible_satellite", "geo_injection", "geo_servicing", "reentry")
@@ -23,3 +28,34 @@ def test_every_dispersion_and_requirement_of_a_shipped_campaign_has_its_source()
     ]
     assert len(campaigns) > 30
     assert unsourced == []
+
+
+ELLIPTIC = {"initial_inclination_deg": 46.0, "parking_eccentricity": 0.2, "parking_argument_of_perigee_deg": 20.0}
+PLACES = ("sun_moon", "reference")  # parameters that say where in the tables of all these cases a case's own begin
+
+
+@pytest.mark.parametrize(
+    ("model", "given"),
+    [("campaigns.deorbit", {}), ("campaigns.flexible_satellite", {}), ("campaigns.geo_servicing", {}),
+     ("campaigns.geo_injection", ELLIPTIC), ("campaigns.reentry.autopilot", {}),
+     ("campaigns.reentry", {"vehicle": "given", "guidance": "law3", "entry_radius_km": 0.0})],
+)  # fmt: skip
+def test_what_is_prepared_for_a_case_has_the_same_bits_alone_and_among_others(model, given):
+    """Every parameter is off its nominal value, those too that no shipped campaign disperses: NumPy's sums of
+    products take another order for another number of cases.
+    """
+    loaded, random = load_model(model), np.random.default_rng(5)
+    inputs = {setting.name: setting.default for setting in loaded.settings}
+    for parameter in loaded.parameters:
+        change = 2e-3 * random.uniform(-1.0, 1.0, 12)
+        off = parameter.default * (1.0 + change) if parameter.default else 10.0 * change
+        inputs[parameter.name] = np.clip(off, parameter.low, parameter.high)
+    inputs |= given
+    together = prepare(loaded, inputs, 12)
+    assert not together.refusals.mask.all()
+    names = loaded.kernel_parameters._fields
+    for case in range(12):
+        one = {name: value[[case]] if isinstance(value, np.ndarray) else value for name, value in inputs.items()}
+        alone = prepare(loaded, one, 1)
+        for name, own, among in zip(names, alone.parameters[:, 0], together.parameters[:, case], strict=True):
+            assert name in PLACES or own.tobytes() == among.tobytes(), (case, name, own, among)
