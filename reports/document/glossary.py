@@ -36,8 +36,8 @@ GLOSSARY = Terms(
         (
             "demonstrated bound",
             "Tolerance limit: the required fraction of cases lies inside it with the required confidence. An order "
-            "statistic (Wilks), distribution-free; two of them where a requirement has two limits. Cases without a "
-            "number take the worst ranks.",
+            "statistic (Wilks), distribution-free. Of two limits, both are moved inward by the distance to the nearest "
+            "that the required fraction keeps. Cases without a number take the worst ranks.",
         ),
         (
             "consumer’s risk",
