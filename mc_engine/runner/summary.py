@@ -215,13 +215,17 @@ def _metrics_of(
 
 
 def summary_lines(metric: str, summary: "Summary", unit: str, random: bool) -> list[str]:
-    """The summary in lines for a terminal; limits of quantiles only where cases are a random sample."""
+    """The summary in lines for a terminal; limits of quantiles only where cases are a random sample.
+
+    Of cases that were chosen, which have no quantiles, the ends alone: a mean would be that of the choice.
+    """
     head = f"{metric}{f' [{unit}]' if unit else ''}: {summary.n_used:,} of {summary.n_tried:,} cases have a number"
     if summary.n_used == 0:
         return [head]
     sd = "-" if summary.sd is None else f"{summary.sd:.6g}"
     told = f"{{:.{_digits(summary)}g}}".format
-    lines = [head, f"  mean {told(summary.mean)}, sd {sd}, from {told(summary.minimum)} to {told(summary.maximum)}"]
+    moments = f"mean {told(summary.mean)}, sd {sd}, " if random or summary.quantiles else ""
+    lines = [head, f"  {moments}from {told(summary.minimum)} to {told(summary.maximum)}"]
     for item in summary.quantiles:
         limits = [told(limit) if limit is not None else "too few cases" for limit in (item.lower, item.upper)]
         interval = f"  [{', '.join(limits)}]" if random else ""

@@ -85,6 +85,7 @@ def test_a_grid_has_ends_and_no_percentiles(tmp_path):
     store.manifest["campaign"]["design"] = "grid"
     found = summaries(store)["propellant_kg"]
     assert (found.quantiles, found.maximum) == ((), store.cases()["propellant_kg"].max())
+    assert " ".join(summary_lines("propellant_kg", found, "kg", random=False)[1].split()[::2]) == "from to"
 
 
 def test_a_summary_in_lines_says_how_many_cases_it_rests_on():
