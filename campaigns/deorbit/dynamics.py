@@ -143,7 +143,10 @@ def law(d, e, w, p, o):
 
 @physics
 def measured(e, rtn, d):
-    """Error of position [m] or velocity [m/s] as navigation sees it: e and its own along R, T, N (source: none)."""
+    """Error of position [m] or velocity [m/s] as the navigation sees it: e, and its own along R, T, N; inertial axes.
+
+    The source's navigation has no errors.
+    """
     normal = cross(d.radial, d.transverse)
     return added_scaled(added_scaled(added_scaled(e, rtn.x, d.radial), rtn.y, d.transverse), rtn.z, normal)
 

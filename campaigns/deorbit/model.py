@@ -15,7 +15,10 @@ from mc_engine.studies.published import read_published
 
 
 def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
-    """Kernel parameters of each case: desired path, erroneous burn, first errors.  i : inputs, SI."""
+    """Kernel parameters of each case: desired path, erroneous burn, first errors.
+
+    i : inputs, float64[n] by symbol, SI;  settings : codes, float64[n], by symbol.  Refused cases join `refusals`.
+    """
     refusals.add(i.modulator_on <= i.modulator_off, "modulator_on_n must be above modulator_off_n")
     path = design_path(i, settings.burn_point == CHOICES.burn_point.ascending, refusals)
     refusals.add(

@@ -26,7 +26,10 @@ LONGEST_DELAY = 2  # samples that the control remembers
 
 
 def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
-    """Kernel parameters of each case: the inputs, matrices inverted, first state, gains, thrusters.  i : inputs, SI."""
+    """Kernel parameters of each case: the inputs, matrices inverted, first state, gains, thrusters.
+
+    i : inputs, float64[n] by symbol, SI;  settings : codes, float64[n], by symbol.  Refused cases join `refusals`.
+    """
     coupling = i.coupling_factor[:, None, None] * COUPLING
     xx, yy, zz = (getattr(i, f"inertia_{axis}") * getattr(i, f"inertia_{axis}_factor") for axis in AXES)
     xy, xz, yz = i.inertia_xy, i.inertia_xz, i.inertia_yz

@@ -102,9 +102,10 @@ def _first_states(i: SimpleNamespace, program: Program) -> np.ndarray:
     r, v = np.reshape(program.start, (2, 3))
     normal = np.cross(r, v)
     radial, normal = r / np.linalg.norm(r), normal / np.linalg.norm(normal)
-    axes = np.stack([radial, np.cross(normal, radial), normal])
-    place = r + np.stack([getattr(i, f"initial_position_{axis}") for axis in AXES], axis=1) @ axes
-    velocity = v + np.stack([getattr(i, f"initial_velocity_{axis}") for axis in AXES], axis=1) @ axes
+    axes = dict(zip(AXES, (radial, np.cross(normal, radial), normal), strict=True))
+    # term by term: the order of NumPy's matrix product follows the number of cases
+    place = r + sum(getattr(i, f"initial_position_{name}")[:, None] * axis for name, axis in axes.items())
+    velocity = v + sum(getattr(i, f"initial_velocity_{name}")[:, None] * axis for name, axis in axes.items())
     radius, speed, time = program.sequence.parking_radius, program.sequence.speed_unit, program.sequence.time_unit
     moved = kepler(place / radius, velocity / speed, i.ignition_delay_1 / time)
     still = np.concatenate([place, velocity], axis=1).T

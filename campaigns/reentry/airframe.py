@@ -29,7 +29,10 @@ def airframe_of(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusal
 
 
 def airframe_rows(i: SimpleNamespace, settings: SimpleNamespace, airframe: Vehicle) -> dict[str, np.ndarray]:
-    """Areas over mass [m^2/kg] of the forces in hypersonic flow, with factors; heating, angles, vehicle's numbers."""
+    """Areas over mass [m^2/kg] of the forces in hypersonic flow, dispersions included; coefficient of the heating.
+
+    Besides them the numbers of the vehicle, by symbol, and angles by cosine and sine.
+    """
     drag = airframe.drag_coefficient * i.cd_factor
     lift = airframe.lift_coefficient * i.cd_factor * i.ld_factor
     trim, tilted = airframe.trim_angle, airframe.trim_angle + i.accelerometer_misalignment

@@ -19,7 +19,10 @@ def circular_speed(altitude_km):
 
 
 def steep_load_g(speed, angle_deg):
-    """Peak load [g] of a straight entry without gravity: H. J. Allen, A. J. Eggers, NACA Rep. 1381 (1958), eq. (15)."""
+    """Largest load [g] of a straight entry without gravity, whatever the vehicle: V^2 sin(angle) / (2 e H0).
+
+    H. J. Allen, A. J. Eggers, NACA Rep. 1381 (1958), eq. (15).
+    """
     return speed**2 * abs(np.sin(np.radians(angle_deg))) / (2.0 * np.e * SCALE_M) / STANDARD_GRAVITY
 
 
@@ -53,12 +56,18 @@ def grazing_load_g(root_beta_r: float) -> float:
 
 
 def critical_roll_deg(entry_angle_deg: float) -> float:
-    """Climb angle up to which a roll to lift down keeps a skip inside, at any K_L, L/D; eqs (10)-(16) of the source."""
+    """Climb angle [deg] up to which a roll to lift down keeps a skip below its entry altitude, whatever K_L and L/D.
+
+    cos = (1 + cos(entry angle)) / 2; from eqs (10)-(16) of the source.
+    """
     return float(np.degrees(np.arccos(0.5 * (1.0 + np.cos(np.radians(entry_angle_deg))))))
 
 
 def glide_range_km(speed: float = 0.95) -> float:
-    """Glide at L/D 1 from a speed in circular speeds: A. J. Eggers, H. J. Allen, S. E. Neice, NACA Rep. 1382 (1958)."""
+    """Range [km] of an equilibrium glide at L/D 1, from a speed in circular speeds.
+
+    A. J. Eggers, H. J. Allen, S. E. Neice, NACA Rep. 1382 (1958).
+    """
     return 0.5 * 1e-3 * WGS84_RADIUS * float(np.log(1.0 / (1.0 - speed**2)))
 
 

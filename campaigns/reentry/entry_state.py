@@ -64,7 +64,10 @@ def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusa
     to_north, to_east, place = frames.local_axes(latitude, longitude)
     ahead = cosine * to_north + sine * to_east
     right = np.cross(ahead, place, axis=0)
-    planned = Planned(place, ahead, right, altitude, radius, latitude, speed, path, heading)
+    planned = Planned(
+        place=place, ahead=ahead, right=right, altitude=altitude, r=radius, latitude=latitude, speed=speed, path=path,
+        heading=heading,
+    )  # fmt: skip
     # the same with its errors
     latitude, longitude = latitude + i.entry_latitude_error, longitude + i.entry_longitude_error
     radius = radius + i.entry_altitude_error

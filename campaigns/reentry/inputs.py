@@ -45,9 +45,13 @@ Inputs = inputs(
         random_draw=True,
         unit="",
     ),
-    density_random_size=Parameter(1.0, "size of the random density, over that of the standard model", low=0.0, unit=""),
-    wind_random_size=Parameter(1.0, "size of the random winds, over that of the standard model", low=0.0, unit=""),
-    wind_mean_size=Parameter(1.0, "size of the mean wind, over that of the standard model", unit=""),
+    density_random_size=Parameter(
+        1.0, "size of the random density, over that of the standard model (weather.py)", low=0.0, unit=""
+    ),
+    wind_random_size=Parameter(
+        1.0, "size of the random winds, over that of the standard model (weather.py)", low=0.0, unit=""
+    ),
+    wind_mean_size=Parameter(1.0, "size of the mean wind, over that of the standard model (weather.py)", unit=""),
     bank_deg=Parameter(60.0, "bank angle: 0 lift up, 90 to the right, 180 down", low=-360.0, high=360.0),
     bank_error_deg=Parameter(0.0, "error of every bank angle", low=-360.0, high=360.0),
     roll_flight_path_angle_deg=Parameter(
@@ -108,7 +112,9 @@ Inputs = inputs(
     guidance=Setting("none", "guidance law", choices=GUIDANCE),
     guidance_period_s=Setting(1.0, "time from one command of the law to the next", low=0.01, high=100.0),
     plan=Setting(
-        "entry", "origin of distances and reference: each case's planned entry, or plan_...", choices=("entry", "given")
+        "entry",
+        "origin of distances and reference path: the planned entry of each case, or the values plan_...",
+        choices=("entry", "given"),
     ),
     plan_speed_m_s=Setting(7800.0, "planned speed at entry, in the frame speed_frame", low=1.0),
     plan_flight_path_angle_deg=Setting(-2.0, "planned flight-path angle at entry", low=-90.0, high=90.0),
@@ -118,10 +124,15 @@ Inputs = inputs(
     plan_altitude_km=Setting(120.0, "planned geodetic altitude of entry", low=1.0),
     plan_radius_km=Setting(0.0, "planned distance of entry from the centre; 0 takes plan_altitude_km", low=0.0),
     plan_ballistic_coefficient_kg_m2=Setting(
-        5498.22 / (12.017 * 1.2569), "planned ballistic coefficient, with vehicle = given", low=1e-3, unit="kg/m^2"
+        5498.22 / (12.017 * 1.2569),
+        "planned ballistic coefficient; a vehicle of vehicles.py has its own",
+        low=1e-3,
+        unit="kg/m^2",
     ),
-    plan_lift_to_drag=Setting(0.30, "planned lift-to-drag ratio, with vehicle = given", low=1e-3, unit=""),
-    plan_trim_angle_deg=Setting(0.0, "planned trim angle, with vehicle = given", low=-90.0, high=90.0),
+    plan_lift_to_drag=Setting(
+        0.30, "planned lift-to-drag ratio; a vehicle of vehicles.py has its own", low=1e-3, unit=""
+    ),
+    plan_trim_angle_deg=Setting(0.0, "planned trim angle; a vehicle of vehicles.py has its own", low=-90.0, high=90.0),
     plan_bank_deg=Setting(60.0, "bank angle of the reference path", low=0.0, high=165.0),
     plan_stop_altitude_km=Setting(10.0, "altitude at which the reference path ends", low=0.0),
     tolerance=Setting(1e-8, "relative error of an integration step", low=1e-14, high=1e-3, unit=""),

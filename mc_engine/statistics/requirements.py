@@ -124,7 +124,7 @@ class Verdict:
     def margin(self) -> float | None:
         """Distance from the demonstrated limit to the required one, positive inside; None if there is none.
 
-        It is not negative exactly where the requirement passes.
+        The requirement passes if and only if there is a margin and it is zero or positive.
         """
         low, high = self.enclosed if self.enclosed is not None else (self.demonstrated, self.demonstrated)
         above = None if self.at_most is None or high is None else self.at_most - high
@@ -344,7 +344,8 @@ def _with_limits_shown(verdict: Verdict, judged: Judged, ranked: Callable[[Judge
     value = ranked(judged, rank)
     if verdict.at_most is None or verdict.at_least is None:
         return replace(verdict, demonstrated=value)
-    return replace(verdict, enclosed=(verdict.at_least + value, verdict.at_most - value))
+    low = verdict.at_least + value
+    return replace(verdict, enclosed=(low, max(low, verdict.at_most - value)))  # midway they may cross by rounding
 
 
 def was_looked_at(manifest: Mapping[str, Any], n_cases: int) -> bool:

@@ -28,7 +28,8 @@ class Judged(NamedTuple):
         """These numbers, float64[n], of the metric's values."""
         if self.at_least is None or self.at_most is None:
             return values
-        return np.minimum(self.at_most - values, values - self.at_least)
+        with np.errstate(over="ignore"):
+            return np.minimum(self.at_most - values, values - self.at_least)
 
 
 def upper_rank(usable: int, accepted: int | None, no_number: int) -> int | None:

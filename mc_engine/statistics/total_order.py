@@ -10,7 +10,7 @@ from the means of its bins.
 Valid for independent inputs.  What the surrogate does not explain (noise in flight, sharp corners of three and more
 inputs, an edge between passed and failed cases) belongs to no input: `unexplained` is its fraction of the variance, and
 a total index may be larger by up to it.  From fewer cases than `FEWEST_CASES` the terms are too few, and neither the
-errors nor what is unexplained tell what they miss: of 50 cases 90 % intervals held 57 to 70 %, of 200 78 to 95 %.
+errors nor what is unexplained tell what they miss: of 50 cases 90 % intervals held 57 to 70 %, of 200 75 to 95 %.
 
 Sudret, Reliab. Eng. Syst. Saf. 93 (2008), 964-979 (indices from polynomial chaos); Blatman & Sudret, Prob. Eng. Mech.
 25 (2010), 183-197 (sparse, chosen by the data).
@@ -26,7 +26,7 @@ from scipy.special import chdtrc, eval_legendre, ndtri
 from mc_engine.statistics.first_order import first_order
 from mc_engine.statistics.input_columns import InputColumn, average_ranks
 
-FEWEST_CASES = 200  # from which on intervals of the indices, with what is unexplained, hold what they say
+FEWEST_CASES = 200  # with which 75 to 95 % of 90 % intervals, with what is unexplained above them, hold
 MOST_DEGREE = 12  # of a single input, and of a product in all
 PLAIN_DEGREE = 3  # powers of the values themselves; above, polynomials of their ranks, which have no tails
 SCREENED_DEGREE = 3  # of each input while pairs are looked for

@@ -43,7 +43,7 @@ def _effect_figure(flown: Flown, contributions: Contributions, shown: list[str])
     few, most = min(used), max(used)
     of = f"{count(few)}{f' to {count(most)}' * (few != most)} of {count(contributions.n_tried)}"
     of_blocks = f"{of} blocks of cases flown for this purpose"
-    fitted = any(row.total is not None for row in contributions.rows())
+    fitted = any(row.total is not None for metric in shown for row in contributions.by_metric[metric])
     of_cases = f"from a surrogate model of {of} cases" if fitted else f"from {of} cases"
     source = f"from {of_blocks}" if contributions.trends is None else of_cases
     return contributor_figure(flown, [(flown.words(item), contributions.by_metric[item]) for item in shown], source)
@@ -165,8 +165,10 @@ def _note(flown: Flown, contributions: Contributions, shown: list[str]) -> str:
             "input owes to its correlation, so that they overlap and do not add up to σ; total effects require "
             "independent inputs and are left out."
         )
-    elif rows and all(row.total is None for row in rows):
-        note += f" Total effects need {FEWEST_OF_TOTALS} cases, or a section [sensitivity] in the campaign file."
+    elif any(row.total is None for row in rows):
+        note += (
+            f" Total effects need {FEWEST_OF_TOTALS} cases with a number, or a section [sensitivity] of the campaign."
+        )
     return note
 
 

@@ -88,7 +88,8 @@ class ContributorRecord(_Record):
     """Shares of a metric's variance.  input : a parameter, a group, "random draws" or "unexplained".
 
     first, total : effects, in [0, 1].  Without flights for the contributors, a total effect may be larger by up to what
-    is "unexplained", and parameters that name a random draw have no row: what they do is in "unexplained".
+    is "unexplained", which its interval includes; parameters that name a random draw have no row then: what they do is
+    in "unexplained".
     fall : the share by which the variance falls with the input at its nominal value, where that was flown; of "random
     draws" the parameters that name a draw have theirs, and noise made in flight stays.
     """

@@ -34,7 +34,8 @@ class Contributor:
 
     first : the share that goes when it alone becomes known.  total : the share that stays when all others are known.
     fall : the share by which the variance falls if it is held at its nominal value.
-    None where that is not known.  Intervals hold with the report's confidence.  first and total lie in [0, 1], as the
+    None where that is not known.  Intervals hold with the report's confidence; from the table of cases those of total
+    effects reach up by the unexplained share.  first and total lie in [0, 1], as the
     shares do that they estimate.
     """
 
@@ -56,7 +57,7 @@ class Contributor:
     def surely_acts(self) -> bool:
         """Whether the total effect is surely above zero, as a first-order effect can be none without it.
 
-        Without a total effect (inputs are correlated), whether the first-order effect is.
+        Without a total effect (inputs are correlated, or cases too few), whether the first-order effect is.
         """
         return surely(self.first_interval if self.total is None else self.total_interval)
 
@@ -170,7 +171,7 @@ def _ranked(
     """The contributors of one metric that have an effect, the strongest first.
 
     shares : values and standard errors float64[n_names] of the first-order and total effects, and of the fall.
-    unassigned : what is part of the total effects of unknown inputs, by which each interval reaches further up.
+    unassigned : share of the variance that no input explains; any total effect may be larger by it.
     """
     # standard errors on each side of an interval
     errors = float(scipy.special.ndtri(0.5 * (1.0 + flown.stated.confidence)))

@@ -98,7 +98,8 @@ def _demonstrated(flown: Flown, name: str, limits: Limits) -> str:
     """What the verification matrix says is demonstrated of a metric, in the same digits; empty without it."""
     for verdict in flown.verdicts:
         known = verdict.enclosed if limits.two_sided else verdict.demonstrated
-        if verdict.metric == name and known is not None:
+        shown = verdict.at_most == limits.at_most and verdict.at_least == limits.at_least
+        if verdict.metric == name and known is not None and (shown or not limits.two_sided):
             where = f"in {percent(verdict.share, 3)} of cases, {percent(verdict.confidence)} confidence"
             return f"{demonstrated_text(verdict, flown.unit(name))} {where}"
     return ""

@@ -35,26 +35,28 @@ PLACES = ("sun_moon", "reference")  # parameters that say where in the tables of
 
 
 @pytest.mark.parametrize(
-    ("model", "given"),
-    [("campaigns.deorbit", {}), ("campaigns.flexible_satellite", {}), ("campaigns.geo_servicing", {}),
-     ("campaigns.geo_injection", ELLIPTIC), ("campaigns.reentry.autopilot", {}),
-     ("campaigns.reentry", {"vehicle": "given", "guidance": "law3", "entry_radius_km": 0.0})],
+    ("model", "n", "given"),
+    [("campaigns.deorbit", 40, {}), ("campaigns.flexible_satellite", 40, {}), ("campaigns.geo_servicing", 12, {}),
+     ("campaigns.geo_injection", 200, {}), ("campaigns.geo_injection", 40, ELLIPTIC),
+     ("campaigns.reentry.autopilot", 40, {}),
+     ("campaigns.reentry", 12, {"vehicle": "given", "guidance": "law3", "entry_radius_km": 0.0})],
 )  # fmt: skip
-def test_what_is_prepared_for_a_case_has_the_same_bits_alone_and_among_others(model, given):
+def test_what_is_prepared_for_a_case_has_the_same_bits_alone_and_among_others(model, n, given):
     """Every parameter is off its nominal value, those too that no shipped campaign disperses: NumPy's sums of
     products take another order for another number of cases.
     """
     loaded, random = load_model(model), np.random.default_rng(5)
     inputs = {setting.name: setting.default for setting in loaded.settings}
     for parameter in loaded.parameters:
-        change = 2e-3 * random.uniform(-1.0, 1.0, 12)
-        off = parameter.default * (1.0 + change) if parameter.default else 10.0 * change
+        change = random.uniform(-1.0, 1.0, n)
+        size = 2e-3 * parameter.default or {"m": 1e5, "m/s": 100.0}.get(parameter.unit, 0.02)
+        off = parameter.default + size * change
         inputs[parameter.name] = np.clip(off, parameter.low, parameter.high)
     inputs |= given
-    together = prepare(loaded, inputs, 12)
+    together = prepare(loaded, inputs, n)
     assert not together.refusals.mask.all()
     names = loaded.kernel_parameters._fields
-    for case in range(12):
+    for case in range(n):
         one = {name: value[[case]] if isinstance(value, np.ndarray) else value for name, value in inputs.items()}
         alone = prepare(loaded, one, 1)
         for name, own, among in zip(names, alone.parameters[:, 0], together.parameters[:, case], strict=True):

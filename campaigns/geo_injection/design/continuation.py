@@ -276,10 +276,8 @@ def _with_burn_ahead(problem: Problem, two: np.ndarray) -> np.ndarray | None:
     return None
 
 
-def _gap(problem: Problem, x: np.ndarray | None) -> float:
+def _gap(problem: Problem, x: np.ndarray) -> float:
     """Length of the primer vector after the first coast less that before, 0 at the optimum: Lawden, chapter 5."""
-    if x is None:
-        return np.nan
     size = np.linalg.norm(switch_states(problem, x[None])[0, :, 6:9], axis=1)
     return float(size[2] - size[1])
 
@@ -298,8 +296,12 @@ def _where_lengths_agree(problem: Problem, low: np.ndarray, high: np.ndarray) ->
         """Unknowns solved for from a guess that is a fraction of the way from `low` to `high`."""
         return solve(problem, low + share * (high - low), FIRST_OF_THREE)
 
+    def gap(share: float) -> float:
+        x = between(share)
+        return np.nan if x is None else _gap(problem, x)
+
     try:
-        x = between(scipy.optimize.brentq(lambda share: _gap(problem, between(share)), 0.0, 1.0, xtol=1e-9))
+        x = between(scipy.optimize.brentq(gap, 0.0, 1.0, xtol=1e-9))
     except ValueError:  # a gap is not a number: there is no solution on the way
         return None
     return None if x is None else solve(problem, x)

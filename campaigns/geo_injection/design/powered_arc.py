@@ -66,7 +66,8 @@ def fly_burns(
 ) -> np.ndarray:
     """States float64[n, 12], canonical units, at the end of burns from the states y, of that shape or [12] for all.
 
-    mass, duration : float64[n], or a number for all; a negative duration is flown backward
+    mass, duration : float64[n], of the initial mass and of the canonical time, or a number for all; a negative
+        duration is flown backward
     thrust, flow : per initial mass
     step : longest; a thrust that turns over, because its primer vector passes near zero, needs short ones
     """

@@ -148,17 +148,18 @@ def new_design(sequence: Sequence) -> Program:
     """The program, designed now, SI; ModelError says how far the search got where it found none."""
     problem, unit, mass = sequence.problem(), sequence.time_unit, 1.0
     if sequence.method == "staged":
-        flown, optimal = [burn[:4] for burn in staged(problem, sequence.orbits_between())], False
+        burns = staged(problem, sequence.orbits_between())
+        flown, optimal = [(burn.ignition, burn.duration, burn.start, burn.end) for burn in burns], False
     else:
         best = optimum(problem)
         flown = list(zip(best.ignitions, best.durations, best.states[::2], best.states[1::2], strict=True))
         optimal = is_optimal(best)
-    burns = []
+    programs, first = [], flown[0][2]
     for ignition, duration, start, end in flown:
         error, segments = _fitted(sequence, start, mass, duration)
-        burns.append(BurnProgram(float(ignition * unit), float(duration * unit), error, sequence.si(end), segments))
+        programs.append(BurnProgram(float(ignition * unit), float(duration * unit), error, sequence.si(end), segments))
         mass -= problem.flow * duration
-    return Program(sequence, sequence.si(flown[0][2]), burns, optimal)
+    return Program(sequence, sequence.si(first), programs, optimal)
 
 
 @lru_cache(maxsize=256)

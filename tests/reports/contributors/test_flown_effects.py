@@ -116,4 +116,6 @@ def test_a_table_of_few_cases_has_no_total_effects():
     few = Flown(synthetic_run(199), "run")
     assert {row.total for row in few.contributions.rows()} == {None}
     table = next(block for block in companion_blocks(few, few.contributions) if isinstance(block, Table))
-    assert table.note.endswith("Total effects need 200 cases, or a section [sensitivity] in the campaign file.")
+    assert table.note.endswith(
+        "Total effects need 200 cases with a number, or a section [sensitivity] of the campaign."
+    )
