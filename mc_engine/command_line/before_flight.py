@@ -126,7 +126,12 @@ def plan(
         int | None, typer.Option(min=0, max=1_000_000, help="Only the row for this many failures.")
     ] = None,
     two_sided: Annotated[
-        bool, typer.Option("--two-sided", help="Also the cases for an interval between order statistics (Wilks).")
+        bool,
+        typer.Option(
+            "--two-sided",
+            help="Also the cases for an interval between order statistics (Wilks). A requirement with two limits needs "
+            "no more cases than one with a single limit.",
+        ),
     ] = False,
 ) -> None:
     """How many cases demonstrate a success probability with a confidence, for 0, 1, 2, ... failures among them.
