@@ -23,14 +23,14 @@ DEPTH = NODES * FIELDS  # index of the depth of the lowest node, in spacings, be
 LENGTH = DEPTH + 1
 # altitude [km] against 1-sigma of the logarithm of the density, of each wind component [m/s], and the mean wind to
 # the east [m/s]
-_PROFILE = (
+_PROFILE = np.array((
     (0.0, 0.01, 5.0, 3.0),
     (11.0, 0.015, 18.0, 22.0),
     (25.0, 0.02, 12.0, 8.0),
     (60.0, 0.05, 35.0, 35.0),
     (80.0, 0.085, 45.0, 20.0),
     (100.0, 0.10, 45.0, 0.0),
-)
+))  # fmt: skip
 # half of each variance is of the small scale, half of the large one: correlation lengths of first-order Gauss-Markov
 # processes [m]
 SMALL_SCALE, LARGE_SCALE = 7.5e3, 20e3
@@ -47,8 +47,7 @@ def node_altitudes(depth: np.ndarray) -> np.ndarray:
 
 def standard_profile(column: int, altitudes: np.ndarray) -> np.ndarray:
     """One column of the magnitudes at altitudes [m]; constant above 100 km and below the ground."""
-    profile = np.array(_PROFILE)
-    return np.interp(altitudes, 1e3 * profile[:, 0], profile[:, column])
+    return np.interp(altitudes, 1e3 * _PROFILE[:, 0], _PROFILE[:, column])
 
 
 def normal_deviates(draw: np.ndarray, count: int) -> np.ndarray:

@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mc_engine.statistics.worst import Limits
+
 
 class Judged(NamedTuple):
     """Numbers whose tolerance limit is what a requirement demonstrates: a metric, or how far it is inside two limits.
@@ -26,10 +28,8 @@ class Judged(NamedTuple):
 
     def of(self, values: np.ndarray) -> np.ndarray:
         """These numbers, float64[n], of the metric's values."""
-        if self.at_least is None or self.at_most is None:
-            return values
-        with np.errstate(over="ignore"):
-            return np.minimum(self.at_most - values, values - self.at_least)
+        limits = Limits(self.at_most, self.at_least)
+        return limits.distances(values) if limits.two_sided else values
 
 
 def upper_rank(usable: int, accepted: int | None, no_number: int) -> int | None:

@@ -27,11 +27,16 @@ class Limits(NamedTuple):
         ends = [end for end in self if end is not None]
         return abs(0.5 * (ends[0] - ends[-1]) if len(ends) > 1 else ends[0]) or 1.0 if ends else 1.0
 
+    def distances(self, values: np.ndarray) -> np.ndarray:
+        """float64[n]: how far the values are inside the nearest limit, negative outside; infinite without a limit."""
+        with np.errstate(over="ignore"):
+            above = np.inf if self.at_most is None else self.at_most - values
+            below = np.inf if self.at_least is None else values - self.at_least
+        return np.minimum(above, below) + 0.0 * values
+
     def margins(self, values: np.ndarray) -> np.ndarray:
-        """float64[n]: distance inside the nearest limit over the reach, negative outside; infinite without a limit."""
-        above = np.inf if self.at_most is None else self.at_most - values
-        below = np.inf if self.at_least is None else values - self.at_least
-        return np.minimum(above, below) / self.reach + 0.0 * values
+        """float64[n]: the distances over the reach."""
+        return self.distances(values) / self.reach
 
     def largest_is_worst(self, values: np.ndarray) -> bool:
         """Whether large values are the bad ones; with two limits, whether the value nearest to one is at the upper."""
