@@ -162,7 +162,7 @@ def fly_cases(
 
 def drawn(campaign: Campaign, case_ids: np.ndarray) -> tuple[Columns, np.ndarray]:
     """(case table, what addresses the noise) of some cases, or of the nominal, which is [NOMINAL_CASE]."""
-    if case_ids.tolist() != [NOMINAL_CASE]:
+    if case_ids.size != 1 or case_ids[0] != NOMINAL_CASE:
         return case_table(campaign, case_ids), noise_ids(campaign, case_ids)
     row = {dispersion.name: campaign.nominal[dispersion.name] for dispersion in campaign.dispersions}
     if campaign.upstream is not None:

@@ -134,8 +134,8 @@ def _arrow_array(column: Column, values: np.ndarray) -> pa.Array:
         codes, positions = np.unique(values, return_inverse=True)
         return _word_array([STATUS_NAME[int(code)] for code in codes], positions)
     if column.kind == "word":
-        if values.size and isinstance(values[0], str) and (values == values[0]).all():  # as a rule; far faster
-            return _word_array([str(values[0])], np.zeros(values.size, dtype=np.int64))
+        if (word := _only_word(values)) is not None:
+            return _word_array([word], np.zeros(values.size, dtype=np.int64))
         words = values.tolist()
         if all(isinstance(word, str) for word in words):
             distinct = {word: place for place, word in enumerate(dict.fromkeys(words))}
@@ -148,6 +148,11 @@ def _arrow_array(column: Column, values: np.ndarray) -> pa.Array:
         return pa.array(values, kind)
     plain = np.packbits(values, bitorder="little") if column.kind == "switch" else np.ascontiguousarray(values)
     return pa.Array.from_buffers(kind, values.size, [None, pa.py_buffer(plain)], null_count=0)
+
+
+def _only_word(values: np.ndarray) -> str | None:
+    """The word that all of these values are, as a rule those of statuses and reasons."""
+    return str(values[0]) if values.size and isinstance(values[0], str) and (values == values[0]).all() else None
 
 
 def _word_array(words: Sequence[str], positions: np.ndarray) -> pa.Array:
@@ -244,6 +249,8 @@ def _status_counts(statuses: np.ndarray) -> dict[str, int]:
         return dict(
             sorted((STATUS_NAME[code], count) for code, count in zip(codes.tolist(), counts.tolist(), strict=True))
         )
+    if (word := _only_word(statuses)) is not None:
+        return {word: statuses.size}
     return dict(sorted(Counter(statuses.tolist()).items()))
 
 

@@ -141,7 +141,10 @@ def test_names_lead_nowhere_but_into_the_directory(tmp_path, monkeypatch, holds_
     assert names_in(root, "in") == ["a"]
 
 
-@pytest.mark.parametrize("name", ["simulator", "simulator/case-0000003", "simulator/case-0000003/case.json"])
+@pytest.mark.parametrize(
+    "name",
+    ["simulator", pytest.param("simulator/case-0000003", marks=pytest.mark.slow), "simulator/case-0000003/case.json"],
+)
 def test_what_a_simulator_leaves_behind_stays_in_the_run(tmp_path, name):
     file = python_campaign(tmp_path / "ball", cases=8, fault="if case.id == 3: raise ValueError('once more')")
     store, outside = runner.run(load_campaign(file), tmp_path / "run", workers=1), tmp_path / "outside"

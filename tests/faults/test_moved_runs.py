@@ -29,7 +29,7 @@ def remove(run, moved):
     [
         ("threading", rename, 0),
         ("loky", rename, 0),
-        ("threading", rename, 2),
+        pytest.param("threading", rename, 2, marks=pytest.mark.slow),
         pytest.param("loky", remove, 0, marks=pytest.mark.slow),
         pytest.param("threading", replace, 0, marks=pytest.mark.slow),
         pytest.param("threading", remove, 0, marks=pytest.mark.slow),

@@ -67,7 +67,7 @@ def assert_gone(processes):
         ("threading", lambda process: os.killpg(process.pid, signal.SIGTERM)),
         pytest.param("loky", lambda process: os.killpg(process.pid, signal.SIGTERM), marks=pytest.mark.slow),
         pytest.param("dask", lambda process: os.killpg(process.pid, signal.SIGINT), marks=pytest.mark.slow),
-        ("dask", lambda process: os.kill(process.pid, signal.SIGTERM)),
+        pytest.param("dask", lambda process: os.kill(process.pid, signal.SIGTERM), marks=pytest.mark.slow),
     ],
 )
 def test_one_signal_lets_what_is_in_flight_land_and_says_how_to_go_on(tmp_path, backend, send, record_property):

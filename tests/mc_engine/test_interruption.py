@@ -90,7 +90,9 @@ def test_a_signal_that_a_library_swallows_stops_the_flight_that_follows(tmp_path
     assert (status, said) == (4, f"interrupted with 0 of 20 cases; `mc-engine resume {run}` flies the rest")
 
 
-@pytest.mark.parametrize("body", ["send()", "\n    ".join(["try: send()", "finally: send()"])])
+@pytest.mark.parametrize(
+    "body", ["send()", pytest.param("\n    ".join(["try: send()", "finally: send()"]), marks=pytest.mark.slow)]
+)
 def test_a_signal_after_the_flight_stops_the_reports_and_names_the_command_that_writes_them(tmp_path, body):
     run, unreported = tmp_path / "run", tmp_path / "unreported"
     status, said = ended(REPORTS, body, "run", "minimal", "--cases", 20, "--out", run)

@@ -1,5 +1,6 @@
 """Texts that try to become more than text, in a page, a typeset document, Markdown or a template."""
 
+import pytest
 from synthetic_run import synthetic_run
 
 PAYLOADS = [
@@ -36,6 +37,8 @@ PAYLOADS = [
     "<template><script>window.struck=19</script></template>",
     "<math><mtext></form><form><mglyph><style></math><img src onerror=window.struck=20>",
 ]
+# for a report each: every third, and the others among the slow tests; a browser gets all of them in one page
+ONE_BY_ONE = [p if k % 3 == 0 else pytest.param(p, marks=pytest.mark.slow) for k, p in enumerate(PAYLOADS)]
 
 
 def hostile(text, others=()):

@@ -262,7 +262,7 @@ def test_a_box_over_a_footprint_chooses_the_flights_that_come_down_there(browser
     assert browser.logged == []
 
 
-@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (390, "dark")])
+@pytest.mark.parametrize(("width", "scheme"), [pytest.param(1400, "light", marks=pytest.mark.slow), (390, "dark")])
 def test_axe_finds_nothing_that_keeps_a_reader_out(browser, tmp_path, width, scheme):
     axe = files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
     file = tmp_path / "report.html"

@@ -37,9 +37,9 @@ def test_thirty_free_days_agree_with_the_twin_to_a_metre():
 
 def test_sunlight_and_shadow_agree_with_the_twin_to_a_metre_in_the_season_of_eclipses():
     """The twin knows nothing of the shadow's edges and goes over them in steps of two minutes."""
-    inputs = FREE | {"duration_days": 2.0, "sunlight": True, "epoch_utc": "2019-03-18T12:00:00", "tolerance": 1e-12}
+    inputs = FREE | {"duration_days": 1.0, "sunlight": True, "epoch_utc": "2019-03-18T12:00:00", "tolerance": 1e-12}
     y, twin = first_states(**inputs)[0], Twin(EQUINOX, light=1.3 * 50.0 / 2500.0)
-    for k in range(2 * 720):
+    for k in range(720):
         y = twin.fly(120.0 * k, y, 120.0, rtol=1e-11)
     assert np.linalg.norm(place(fly_one(**inputs)) - y[:3]) < 1.0
     dark = place(fly_one(**inputs | {"sunlight": False}))

@@ -86,7 +86,9 @@ def test_control_is_sampled_in_its_own_phase_alone(inputs, whole):
     np.testing.assert_array_equal(whole["samples"], samples)
 
 
-@pytest.mark.parametrize(("width", "chunk", "threads"), [(1, 5, 1), (8, 1, 2), (16, 7, 2)])
+@pytest.mark.parametrize(
+    ("width", "chunk", "threads"), [pytest.param(1, 5, 1, marks=pytest.mark.slow), (8, 1, 2), (16, 7, 2)]
+)
 def test_bytes_depend_on_no_width_chunk_thread_or_order(model, inputs, whole, width, chunk, threads):
     cases = np.random.default_rng(width).permutation(N_CASES)
     parts = [cases[first : first + chunk] for first in range(0, N_CASES, chunk)]

@@ -1,9 +1,12 @@
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mc_engine.sampling.streams import SEED_CONTRACT, stream, uniforms
+from mc_engine.sampling import first_numbers
+from mc_engine.sampling.streams import SEED_CONTRACT, stream, uniform_columns, uniforms
 
 SEEDS = st.integers(0, 2**63 - 1)
 NAMES = st.text(min_size=1, max_size=20)
@@ -15,6 +18,25 @@ CASES = st.lists(st.integers(0, 2**62), max_size=20)
 def test_each_uniform_is_the_first_number_of_its_stream_bit_for_bit(seed, name, cases):
     draws = uniforms(seed, name, np.array(cases, dtype=np.int64))
     assert draws.tolist() == [stream(seed, name, case).random() for case in cases]
+
+
+def test_many_numbers_at_once_are_the_first_numbers_of_their_streams_too():
+    names, n = ["ve_pct", "oe_deg", "a"], first_numbers._MANY // 3 + 1
+    cases = np.random.default_rng(1).integers(0, 2**62, n)
+    many = uniform_columns(11, names, cases)
+    few = np.concatenate([uniform_columns(11, names, part) for part in np.array_split(cases, 7)], axis=1)
+    assert many.tobytes() == few.tobytes()
+    for place in (0, 1, n - 1):
+        assert many[:, place].tolist() == [stream(11, name, int(cases[place])).random() for name in names]
+
+
+def test_threads_that_ask_for_many_numbers_at_once_get_the_same(monkeypatch):
+    monkeypatch.setattr(first_numbers, "_MANY", 1)
+    first_numbers._machine_code.cache_clear()
+    cases = np.arange(40_000)
+    with ThreadPoolExecutor(8) as pool:
+        columns = [*pool.map(lambda _: uniforms(7, "dv", cases).tobytes(), range(8))]
+    assert set(columns) == {uniforms(7, "dv", cases).tobytes()}
 
 
 def test_the_seed_contract_is_one_and_these_are_its_numbers():

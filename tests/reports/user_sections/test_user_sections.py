@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from payloads import PAYLOADS
+from payloads import ONE_BY_ONE
 from synthetic_run import synthetic_run
 
 from mc_engine.errors import EngineError
@@ -94,7 +94,7 @@ mc-engine run
     assert plain.paragraphs == ("<b>not bold</b>",)
 
 
-@pytest.mark.parametrize("payload", PAYLOADS)
+@pytest.mark.parametrize("payload", ONE_BY_ONE)
 def test_values_of_a_run_are_neither_markdown_nor_templates(filled, run, payload):
     facts = run_facts(Flown(run, "run"), payload)
     (text,) = own(filled("# T\n\nA {{ run.title }} B", facts=facts))
