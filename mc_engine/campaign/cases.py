@@ -60,14 +60,18 @@ def _checked_ids(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
     if campaign.first is not None:
         message = f'has yet to be flown; `mc-engine run` flies "{campaign.first.name}" before this campaign'
         raise CampaignError(campaign.name, [Problem("inputs.from", message)])
-    endless = campaign.design in EXTENSIBLE and campaign.upstream is None
-    beyond = ids >= (math.inf if endless else campaign.cases)
+    beyond = ids >= (math.inf if is_endless(campaign) else campaign.cases)
     if ids.size and (ids.min() < 0 or beyond.any()):
         wrong = int(ids[(ids < 0) | beyond][0])
         raise CampaignError(
             campaign.name, [Problem("", f"there is no case {wrong}; they are 0 to {campaign.cases - 1}")]
         )
     return ids
+
+
+def is_endless(campaign: Campaign) -> bool:
+    """Whether there are cases beyond the campaign's number of them: those of a longer campaign."""
+    return campaign.design in EXTENSIBLE and campaign.upstream is None
 
 
 def _random_table(campaign: Campaign, ids: np.ndarray) -> dict[str, np.ndarray]:

@@ -44,6 +44,7 @@ def take_inputs(
     run : used instead of the one that [inputs] names.  load : reads that campaign, as `load_campaign` does.
     """
     if sections.inputs is None:
+        _check_unasked(run, findings)
         return None, None
     from mc_engine.campaign.columns import result_columns
     from mc_engine.campaign.upstream import find_run, link, read_rows
@@ -88,6 +89,15 @@ def take_inputs(
             "from", f'its design "{rows.facts["design"]}" does not go with "{design}"; write design = "table"'
         )
     return link(rows, sections.inputs, model, own_columns, section_findings), first
+
+
+def _check_unasked(run: Path | None, findings: Findings) -> None:
+    """Note a run to take inputs from where [inputs] does not say which; the copy inside a run directory need not be."""
+    from mc_engine.campaign.upstream import COMPANION
+
+    written = any(problem.place.split(".")[0] == "inputs" for problem in findings.problems)
+    if run is not None and run.name != COMPANION and not written:
+        findings.add("inputs", "is missing; --from needs a section [inputs], which says what is taken from that run")
 
 
 def _rows_to_come(first: "Campaign") -> "Rows":

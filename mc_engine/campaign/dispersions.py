@@ -100,6 +100,7 @@ def _check_keys_fit(spec: Mapping[str, Any], design: str, context: DispersionCon
     if design in BY_LEVELS:
         if "values" in spec and "levels" in spec:
             findings.add("levels", "there are values already; give one of the two")
+        _check_level_keys(spec, findings)
     elif dist is None:
         findings.add("dist", f'is missing; the design "{design}" needs one of {listed(DISTRIBUTIONS)}')
     else:
@@ -109,6 +110,16 @@ def _check_keys_fit(spec: Mapping[str, Any], design: str, context: DispersionCon
     if isinstance(context.item, Setting) and dist not in (None, "discrete", "constant"):
         own = f", or disperse {context.item.dispersed_by}" if context.item.dispersed_by else ""
         findings.add("dist", f'"{dist}" does not fit a setting, which all cases of a batch share; use "discrete"{own}')
+
+
+def _check_level_keys(spec: Mapping[str, Any], findings: Findings) -> None:
+    """Note keys that say nothing of the levels of an axis."""
+    if spec.get("dist") == "constant":
+        for key in [key for key in ("levels", "values") if key in spec]:
+            findings.add(key, "belongs to an axis of several levels; a constant has one, its value")
+    elif "dist" not in spec and "values" in spec:
+        for key in [key for key in ("mean", "half_range", "three_sigma", "lower", "upper") if key in spec]:
+            findings.add(key, "belongs to levels = n; values already say it all")
 
 
 def _levels(context: DispersionContext, distribution: Distribution | None) -> tuple[Scalar, ...]:

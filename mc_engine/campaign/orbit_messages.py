@@ -17,6 +17,7 @@ from mc_engine.numbers_in_text import is_real
 
 AXES = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
 LOCAL = ("RTN", "TNW")
+_REPEATED = "MAN_"  # how the keywords of an OPM begin that each of its manoeuvres has again
 _SAME = {"RSW": "RTN", "RIC": "RTN"}  # other names of the same axes
 _ENTRIES = tuple((f"C{row}_{column}", i, j) for i, row in enumerate(AXES) for j, column in enumerate(AXES[: i + 1]))
 
@@ -94,7 +95,9 @@ def _opm(lines: list[tuple[int, str]]) -> UncertainState:
         key, equals, value = (part.strip() for part in line.partition("="))
         if not equals:
             raise MessageFault(f'line {number}: "{line[:40]}" is not KEYWORD = value')
-        facts.setdefault(key, (number, re.sub(r"\s*\[[^]]*\]$", "", value)))
+        if key in facts and not key.startswith(_REPEATED):
+            raise MessageFault(f"line {number}: {key} is there already, in line {facts[key][0]}; leave one of them out")
+        facts[key] = (number, re.sub(r"\s*\[[^]]*\]$", "", value))
     missing = [
         name for name in ("EPOCH", "REF_FRAME", *AXES, *(entry for entry, _, _ in _ENTRIES)) if name not in facts
     ]
@@ -110,7 +113,10 @@ def _opm(lines: list[tuple[int, str]]) -> UncertainState:
 
 
 def _oem(lines: list[tuple[int, str]]) -> Iterator[UncertainState]:
-    """Every covariance, with the state of its segment at the same epoch."""
+    """Every covariance, with the state of its segment at the same epoch.
+
+    Without a COV_REF_FRAME of its own, each covariance is in the frame of the segment.
+    """
     frame, own, epoch = "", "", ""
     states: dict[datetime, np.ndarray] = {}
     inside = False
@@ -120,14 +126,18 @@ def _oem(lines: list[tuple[int, str]]) -> Iterator[UncertainState]:
         if line == "META_START":
             states = {}
         elif line in ("COVARIANCE_START", "COVARIANCE_STOP"):
-            inside, own = line.endswith("START"), frame
+            _check_rows(number, rows)
+            inside, own, epoch, rows = line.endswith("START"), frame, "", []
         elif key == "REF_FRAME":
             frame = _plain_frame(value)
         elif inside and key == "COV_REF_FRAME":
             own = _plain_frame(value)
         elif inside and key == "EPOCH":
-            epoch, rows = value, []
+            _check_rows(number, rows)
+            own, epoch, rows = frame, value, []
         elif inside and not equals:
+            if len(rows) == 6:
+                raise MessageFault(f"line {number}: a seventh row; a covariance has six, the next begins with EPOCH")
             rows.append([_finite_number(number, word) for word in line.split()])
             if len(rows[-1]) != len(rows):
                 raise MessageFault(f"line {number}: {len(rows[-1])} numbers; row {len(rows)} of a covariance has "
@@ -139,6 +149,13 @@ def _oem(lines: list[tuple[int, str]]) -> Iterator[UncertainState]:
         elif not equals and len(line.split()) in (7, 10):
             when, *numbers = line.split()
             states[_moment(number, when)] = np.array([_finite_number(number, word) for word in numbers[:6]])
+    _check_rows(lines[-1][0], rows)
+
+
+def _check_rows(line: int, rows: list[list[float]]) -> None:
+    """MessageFault where a covariance ends before its sixth row."""
+    if len(rows) not in (0, 6):
+        raise MessageFault(f"line {line}: the covariance before has {len(rows)} of its six rows; give all six")
 
 
 def _plain_frame(name: str) -> str:

@@ -34,6 +34,7 @@ from mc_engine.sampling.distributions import Scalar
 from mc_engine.sampling.sobol import MAX_DIMENSIONS
 from mc_engine.suggestions import hint, listed
 
+COMPLETED = "completed"  # stands beside the names of requirements in a comparison
 _LARGEST_HYPERCUBE = 10_000_000  # cases; a Latin hypercube is held in memory as a whole
 _CASES_PER_CORRELATED = 10  # a Latin hypercube with fewer may not have room for the correlations asked for
 
@@ -227,6 +228,8 @@ def check_requirements(
     kept = []
     for name, section in sections.items():
         section_findings = findings.under(name)
+        if name == COMPLETED:
+            section_findings.add("", "is what the share of completed cases is called; give it another name")
         check_metric(section.metric, model, section_findings)
         check_limits(section, section_findings)
         kept.append(Requirement(name, **section.model_dump(exclude={"note"})))

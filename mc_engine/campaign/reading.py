@@ -206,6 +206,11 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
+def name_fault(name: str) -> str:
+    """Why a file cannot choose such a name, as a sentence; empty if it can."""
+    return "" if _FREE_NAME.fullmatch(name) else f"{shown(name)} is no name; use letters, digits, _ and -, 60 at most"
+
+
 def _tables(
     section: type[_AnySection] | Callable[[Any, Findings], _AnySection | None],
     document: dict[str, Any],
@@ -230,8 +235,8 @@ def _tables(
         raw = {f"{name} {k}": entry for k, entry in enumerate(raw, start=1)}
     sections = {}
     for key, entry in raw.items():
-        if free and not _FREE_NAME.fullmatch(key):
-            findings.add(name, f"{shown(key)} is no name; use letters, digits, _ and -, 60 at most")
+        if free and (sentence := name_fault(key)):
+            findings.add(name, sentence)
         elif (table := reader(entry, findings.under(key) if listed else findings.under(name, key))) is not None:
             sections[key] = table
     return sections

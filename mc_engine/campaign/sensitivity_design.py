@@ -15,7 +15,7 @@ import numpy as np
 
 from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.campaign.parts import Correlation, rank_pairs
-from mc_engine.campaign.reading import Findings
+from mc_engine.campaign.reading import Findings, name_fault
 from mc_engine.campaign.sections import MOST_CASES, HistoriesSection, SensitivitySection
 from mc_engine.model.fields import Parameter
 from mc_engine.model.simulator import Simulator, System
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 DESIGN = "pick_freeze"
 _POINTS = ("a", "b", "c")
+_CASES_OF = "cases of "  # and the name of the campaign before: the group of its cases
 _NOISE = 2**50  # where no case of a run draws its noise
 
 
@@ -73,7 +74,7 @@ def check_sensitivity(
     problems = len(findings.problems)
     groups = dict(_groups(section, model, dispersions, correlations, findings.under("group")))
     if upstream is not None:
-        groups = {f"cases of {upstream}": (), **groups}
+        groups = {_CASES_OF + upstream: (), **groups}
     chosen = SensitivityDesign(section.cases, groups)
     if not groups:
         findings.add("", "there is no dispersion whose contribution could be computed")
@@ -94,17 +95,19 @@ def _groups(
     """Each group with its dispersions, in the order of the file; the random draws last."""
     names = [dispersion.name for dispersion in dispersions]
     draws = [name for name in names if names_a_draw(model, name)]
-    home = {name: name for name in names}  # the group of each dispersion
+    chosen: dict[str, str] = {}  # the group that the file puts a dispersion in
     for group, members in section.group.items():
+        _check_group(group, members, names, findings)
         for name in members:
-            if name not in home:
+            if name not in names:
                 findings.add(group, f'"{name}" is not dispersed{hint(name, names)}')
             elif name in draws:
                 findings.add(group, f'"{name}" names a random draw; it is in the group "{RANDOM_DRAWS}"')
-            elif home[name] != name:
-                findings.add(group, f'"{name}" is in the group "{home[name]}" already')
+            elif name in chosen:
+                findings.add(group, f'"{name}" is in the group "{chosen[name]}" already')
             else:
-                home[name] = group
+                chosen[name] = group
+    home = {name: chosen.get(name, name) for name in names}  # the group of each dispersion
     for pair in correlations:  # inputs that are correlated have no contributions of their own
         first, second = home[pair.first], home[pair.second]
         joined = f"{first}, {second}" if first != second else first
@@ -113,6 +116,18 @@ def _groups(
         yield group, tuple(name for name in names if home[name] == group)
     if draws or (model.may_draw if isinstance(model, Simulator) else model.control is not None):
         yield RANDOM_DRAWS, tuple(draws)
+
+
+def _check_group(group: str, members: Sequence[str], dispersed: Sequence[str], findings: Findings) -> None:
+    """Note a name that the group cannot have, and a group without members.  Names may have blanks inside."""
+    if (sentence := name_fault(group.replace(" ", "_"))) or group != group.strip():
+        findings.add("", sentence or f'"{group}" begins or ends with a blank')
+    elif group == RANDOM_DRAWS or group.startswith(_CASES_OF):
+        findings.add(group, "is what the engine calls a group of its own; choose another name")
+    elif group in dispersed and group not in members:
+        findings.add(group, "is the name of a dispersion outside the group; choose another name")
+    if not members:
+        findings.add(group, "has no members; name dispersions, or leave the group out")
 
 
 def names_a_draw(model: System, name: str) -> bool:
@@ -202,6 +217,6 @@ def upstream_ids(campaign: "Campaign", case_ids: np.ndarray) -> np.ndarray:
     if campaign.design != DESIGN or campaign.upstream is None:
         return case_ids
     layout, block, row = _blocks(campaign, case_ids)
-    points = layout.points(f"cases of {campaign.upstream.name}")[row]
+    points = layout.points(_CASES_OF + campaign.upstream.name)[row]
     draws = [uniforms(campaign.seed, f"upstream/{DESIGN} {point}", block) for point in _POINTS]
     return (np.choose(points, draws) * campaign.upstream.rows.n_cases).astype(np.int64)

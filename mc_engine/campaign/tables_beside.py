@@ -26,7 +26,7 @@ MOST_PARQUET_BYTES, MOST_PARQUET_CELLS = 2**32, 2**28
 MOST_COLUMNS = 10_000
 _MOST_LINES = 5  # named in one sentence
 _LONGEST_NAME = 60  # written out in one
-
+_PARQUET = (".parquet", ".pq")
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet calculates a cell that begins so
 _NUMBERS = (int, float, np.number, Decimal)  # of a table that has types
@@ -35,7 +35,7 @@ _GUARD = "'"  # which makes it text
 
 def read_columns(path: Path) -> dict[str, np.ndarray]:
     """Column name -> object[n] of text (CSV) or a plain array (Parquet), in the order of the file."""
-    if path.suffix.lower() in (".parquet", ".pq"):
+    if path.suffix.lower() in _PARQUET:
         return _read_parquet(path)
     if path.suffix.lower() not in (".csv", ".txt"):
         raise FileFault(f'"{path.name}" ends in neither .csv nor .parquet')
@@ -160,13 +160,16 @@ def switches(path: Path, name: str, cells: np.ndarray) -> np.ndarray:
 def empirical_numbers(path: Path, column: str | None) -> tuple[float, ...]:
     """The finite numbers of one column, sorted.  A CSV file of one column may do without a name."""
     columns = read_columns(path)
+    headless = path.suffix.lower() not in _PARQUET and all(is_real(name) for name in columns)
+    if headless and (column is not None or len(columns) > 1):
+        raise FileFault(f'"{path.name}" has numbers in its first line; put a line with the names of the columns first')
     if column is None and len(columns) > 1:
         raise FileFault(f'"{path.name}" has {len(columns)} columns; say which with column = "{next(iter(columns))}"')
     name = column if column is not None else next(iter(columns))
     if name not in columns:
         raise FileFault(f'"{path.name}" has no column "{name}"; it has {", ".join(columns)}')
     cells = columns[name]
-    if column is None and is_real(name):
+    if headless:
         cells = np.array([name, *cells], dtype=object)
     if len(cells) == 0:
         raise FileFault(f'"{path.name}" has no numbers below its first line')

@@ -184,7 +184,7 @@ def export(
         str | None, typer.Option(help="For oem: start of the flights in UTC; by default the setting epoch_utc.")
     ] = None,
     frame: Annotated[str | None, typer.Option(help="For oem: reference frame of the columns, such as EME2000.")] = None,
-    centre: Annotated[str, typer.Option(help="For oem: the body at the origin.")] = "EARTH",
+    centre: Annotated[str | None, typer.Option(help="For oem: the body at the origin; by default EARTH.")] = None,
 ) -> None:
     """Write where the cases ended, for other tools."""
     if kind not in EXPORT_FORMATS:
@@ -197,14 +197,27 @@ def export(
         leave(USAGE, f"--out {path}: there is no folder {path.parent}")
     from mc_engine.studies.end_states import end_columns, write_csv
 
-    names = [name.strip() for name in columns.split(",")] if columns else end_columns(store)
+    names = end_columns(store) if columns is None else _named_columns(store, columns)
+    if kind == "csv":
+        for option, value in (("--epoch", epoch), ("--frame", frame), ("--centre", centre)):
+            if value is not None:
+                leave(USAGE, f"{option} is for --format oem; leave it out, a table has none")
+        typer.echo(f"{path}: {write_csv(store, names, path):,} cases")
+        return
+    _write_oem(store, names if columns else [], path, epoch, frame, "EARTH" if centre is None else centre)
+
+
+def _named_columns(store: "Store", text: str) -> list[str]:
+    """The columns of --columns, each of them once."""
+    names = [name.strip() for name in text.split(",")] if text.strip() else []
+    if not names:
+        leave(USAGE, "--columns names no column; leave the option out for the columns at the end of the flights")
     for name in names:
         if name not in store.units:
             leave(USAGE, f'--columns: there is no column "{name}"{hint(name, store.units)}')
-    if kind == "csv":
-        typer.echo(f"{path}: {write_csv(store, names, path):,} cases")
-        return
-    _write_oem(store, names if columns else [], path, epoch, frame, centre)
+        if names.count(name) > 1:
+            leave(USAGE, f'--columns: "{name}" is there twice; name each column once')
+    return names
 
 
 def _write_oem(store: "Store", names: list[str], path: Path, epoch: str | None, frame: str | None, centre: str) -> None:

@@ -278,9 +278,10 @@ def resume(
         from mc_engine.store.repair import mend_journal
 
         mend_journal(folder)
-    looks = existing_run(folder).manifest.get("looks")
+    flown = existing_run(folder)
+    looks = flown.manifest.get("looks")
     if not repair and not looks and is_complete(folder):
-        _leave_complete(folder, publish)
+        _leave_complete(flown, publish)
         return
     if looks:
         from mc_engine.runner.stopping import carry_on
@@ -295,12 +296,17 @@ def resume(
     finish(store, no_report, url=publish)
 
 
-def _leave_complete(folder: Path, url: str | None) -> None:
-    named = shell_word(folder)
-    typer.echo(
-        f"{folder}: is complete; `mc-engine extend {named} --cases N` adds cases, "
-        f"`mc-engine report {named}` writes the reports anew"
-    )
+def _leave_complete(store: "Store", url: str | None) -> None:
+    from mc_engine.sampling.designs import extension_problem
+
+    folder, named = store.path, shell_word(store.path)
+    more = f"`mc-engine extend {named} --cases N` adds cases, "
+    if extension_problem(store.manifest, store.n_cases, store.n_cases + 1):
+        more = ""
+    next_step = f"{more}`mc-engine report {named}` writes the reports anew"
+    if store.manifest.get("shard"):
+        next_step = "`mc-engine merge RUN SHARD...` makes one run of all shards, and its reports"
+    typer.echo(f"{folder}: is complete; {next_step}")
     if url is not None:
         echo_publication(folder, url)
 

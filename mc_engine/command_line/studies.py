@@ -333,6 +333,7 @@ def bench(
     if methods and card:
         raise typer.BadParameter("--methods and --card are two measurements; ask for one of them")
     campaign = load_campaign(file)
+    _say_all_fly(campaign, cases)
     if methods:
         _echo_methods(campaign, cases, repeats)
         return
@@ -346,6 +347,14 @@ def bench(
     typer.echo(f"{campaign.name}: {flight.n_cases} cases a flight, the fastest of {repeats}, one thread")
     for line in _timing_lines(timing, usual_width(flight.model)):
         typer.echo(line)
+
+
+def _say_all_fly(campaign: "Campaign", cases: int | None) -> None:
+    """Say that there are fewer cases than asked for, where the design cannot have more."""
+    from mc_engine.campaign.cases import is_endless
+
+    if cases is not None and cases > campaign.cases and campaign.first is None and not is_endless(campaign):
+        typer.echo(f"--cases {cases:,}: {campaign.name} has {campaign.cases:,} cases by its design; all fly", err=True)
 
 
 def _echo_methods(campaign: "Campaign", cases: int | None, repeats: int) -> None:

@@ -226,6 +226,8 @@ def grid_of(clock: FixedStep, settings: Any) -> tuple[int, float, int]:
     if not (step > 0.0 and 0.0 < until <= _MOST_STEPS * step and every >= 1.0):
         raise ModelError(f"the clock has steps of {step:g} s until {until:g} s, control every {every:g} steps; all "
                          f"must be above 0, with no more than {_MOST_STEPS:,} steps")  # fmt: skip
+    if every % 1.0:
+        raise ModelError(f"the clock's `control_every` is {every:g}; it counts steps, in whole numbers")
     # a hair under the quotient, so that 300 s in steps of 0.01 s are 30 000 steps, not 30 001
     n_steps = max(1, int(np.ceil(until / step - 1e-9)))
     return n_steps, step, int(every)

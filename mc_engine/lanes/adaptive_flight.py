@@ -21,6 +21,7 @@ from mc_engine.lanes.adaptive_step import (
     first_length,
     ideal_factor,
     is_lost,
+    jump_time,
     leap,
     next_length,
     sense,
@@ -286,6 +287,7 @@ def _fly(
         there = sense(f, t_end, end, here.m, k, p, o, _REACH * h)
         if starting:
             here = select(new | altered, there, here)
+            when = map_fields(jump_time, kinds, when, best, here.values, here.t, altered)
             best = map_fields(best_value, kinds, best, here.values, altered)
             best = select(new, here.values, best)
             when = select(new, map_fields(first_time, here.values, zero), when)
@@ -300,8 +302,9 @@ def _fly(
         error = where(any_field(map_fields(is_lost, kinds, there.values)) & (not over), _NAN, error)
         good = good & (error <= 1.0)
         poor = stepping & (not good)
-        turn = least(map_fields(turn_length, kinds, here.senses, here.rates, there.senses, there.rates, signs, trial))
-        dip = good & (not over) & (turn < trial)
+        turn = least(map_fields(turn_length, kinds, here.senses, here.rates, there.senses, there.rates, trial))
+        dip = good & (turn < trial)  # before what the step crosses, perhaps
+        over = over & (not dip)
         fits = good & (not over) & (not dip)
         cut = (length < h) & (not poor)
         ideal = trial * ideal_factor(error, -1.0 / clock.order)

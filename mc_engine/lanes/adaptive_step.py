@@ -151,6 +151,13 @@ def best_time(kind, when, best, value, fired, t, mask):
 
 
 @physics
+def jump_time(kind, when, best, value, t, mask):
+    """Time of the best value of a peak that jumps, at a sample of the control or an event."""
+    peak = (kind == PEAK) | (kind == CORNER)
+    return where(mask & peak & (value > best), t, when)
+
+
+@physics
 def is_lost(kind, value):
     """Mask: the function of an event is not a number."""
     return (kind == EVENT) & (value != value)
@@ -166,13 +173,14 @@ def arm(kind, sense0, value0, sense1, value1, best, h):
 
 
 @physics
-def turn_length(kind, sense0, rate0, sense1, rate1, direction, h):
+def turn_length(kind, sense0, rate0, sense1, rate1, h):
     """Length to the turn of a sense that may have crossed zero and come back; h where it has not.
 
-    The tangents at both ends bound a sense that is bent one way; where they meet beyond zero it is worth a look.
+    One of the two crossings has the direction of the event, whichever that is.  The tangents at both ends bound a sense
+    that is bent one way; where they meet beyond zero it is worth a look.
     """
-    down = (sense0 > 0.0) & (sense1 > 0.0) & (rate0 < 0.0) & (rate1 > 0.0) & (direction <= 0.0)
-    up = (sense0 < 0.0) & (sense1 < 0.0) & (rate0 > 0.0) & (rate1 < 0.0) & (direction >= 0.0)
+    down = (sense0 > 0.0) & (sense1 > 0.0) & (rate0 < 0.0) & (rate1 > 0.0)
+    up = (sense0 < 0.0) & (sense1 < 0.0) & (rate0 > 0.0) & (rate1 < 0.0)
     turning = (down | up) & ((kind == EVENT) | (kind == LAST))
     x = (sense1 - sense0 - rate1 * h) / where(turning, rate0 - rate1, 1.0)
     reaches = (sense0 + rate0 * x) * sense0 <= 0.0

@@ -177,7 +177,7 @@ class Memory:
             before = -1.0 if event.direction == "rising" else 1.0
             field = name if sum(calls[name] == call for call in calls.values()) > 1 else ""
             picks.append(("result", own.index(calls[name]), field) if name in events else ("constant", before, ""))
-        only = own[0][0] if len({*calls.values()}) == 1 else None
+        only = own[0][0] if own and len({*calls.values()}) == 1 else None
         return ComposedFunction(own, record_class("Events", [*self.events]), picks, only)
 
     def event_list(self) -> tuple[Event, ...]:
@@ -281,6 +281,9 @@ def noted_field(event: str, symbol: str = "") -> str:
 
 def record_class(title: str, names: Sequence[str]) -> Any:
     """A named tuple; ModelError for names that it cannot have."""
+    if twice := next((name for name in names if names.count(name) > 1), ""):
+        raise ModelError(f'{title}: the field "{twice}" is there twice; the engine keeps the time of an event as '
+                         "`time_of_EVENT` and what is due as `EVENT_due`: take another name")  # fmt: skip
     try:
         return namedtuple(title, names)
     except ValueError as error:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from mc_engine.cache_folder import cache_folder
-from mc_engine.campaign.cases import case_table
+from mc_engine.campaign.cases import case_table, is_endless
 from mc_engine.campaign.loading import Campaign
 from mc_engine.durable_file import disk_errors
 from mc_engine.errors import EngineError
@@ -113,7 +113,8 @@ def measure_card(campaign: Campaign, n_cases: int | None = None, repeats: int = 
     from mc_engine.runner.cards import CardFlyer
 
     file = _measurement_of(campaign)
-    ids = np.arange(min(n_cases or LARGEST_CHUNK, campaign.cases), dtype=np.int64)
+    most = n_cases if n_cases is not None and is_endless(campaign) else campaign.cases
+    ids = np.arange(min(n_cases or LARGEST_CHUNK, most), dtype=np.int64)
     table, workers = case_table(campaign, ids), os.cpu_count() or 1
 
     def flight(flyer: Flyer) -> Callable[[], object]:

@@ -20,6 +20,7 @@ from mc_engine.model.files import FileFault
 from mc_engine.numbers_in_text import is_real
 from mc_engine.runner.flown_campaign import companions_of
 from mc_engine.runner.manifest import columns_of, manifest_of
+from mc_engine.sampling.distributions import column as typed_column
 from mc_engine.status import NO_RESULT, NOT_FINITE, OK, STATUS_NAME
 from mc_engine.store.store import Store, create_store
 from mc_engine.suggestions import hint
@@ -80,10 +81,13 @@ def _results(campaign: Campaign, file: Path, table: Columns, problems: list[Prob
         return {}, {}
     drawn = case_table(campaign, np.arange(campaign.cases))
     _refuse_unknown_words(table, problems)
+    place = np.flatnonzero(ids == -1)[:1]
     for name in inputs:
         _compare(name, table[name][order], drawn[name], file, problems)
+        wanted = typed_column([campaign.nominal[name]] * place.size)
+        _compare(name, table[name][place], wanted, file, problems, nominal=True)
     rows = {name: values[name][order] for name in metrics}
-    return {**drawn, **_judged(campaign, table, order, rows)}, _nominal(campaign, values, metrics)
+    return {**drawn, **_judged(campaign, table, order, rows)}, _nominal(campaign, table, place, values, metrics)
 
 
 def _numbers_or_nan(file: Path, name: str, cells: np.ndarray) -> np.ndarray:
@@ -115,8 +119,10 @@ def _refuse_unknown_words(table: Columns, problems: list[Problem]) -> None:
             problems.append(Problem("status", message))
 
 
-def _compare(name: str, given: np.ndarray, drawn: np.ndarray, file: Path, problems: list[Problem]) -> None:
-    """Note an input that is not the one that the campaign draws."""
+def _compare(
+    name: str, given: np.ndarray, drawn: np.ndarray, file: Path, problems: list[Problem], nominal: bool = False
+) -> None:
+    """Note an input that is not the one that the campaign draws, or not the nominal one."""
     if drawn.dtype.kind == "f":
         try:
             cells = numbers(file, name, given)
@@ -130,6 +136,8 @@ def _compare(name: str, given: np.ndarray, drawn: np.ndarray, file: Path, proble
         texts = [str(column[wrong[0]]) for column in (given, drawn)] if wrong.size else []
     if wrong.size:
         message = f"case {wrong[0]} has {texts[0]}, and the campaign draws {texts[1]}; {wrong.size:,} cases differ"
+        if nominal:
+            message = f"case -1 has {texts[0]}, and the nominal value of the campaign is {texts[1]}"
         problems.append(Problem(name, f"{message}; `mc-engine sample` gives the inputs"))
 
 
@@ -150,14 +158,18 @@ def _judged(campaign: Campaign, table: Columns, order: np.ndarray, rows: Columns
     return {"status": status, "reason": words["reason"], **metrics}
 
 
-def _nominal(campaign: Campaign, values: Columns, metrics: list[str]) -> Columns:
-    """The nominal row: the one with the case_id -1, or one without results."""
-    place = np.flatnonzero(values["case_id"] == -1)
+def _nominal(campaign: Campaign, table: Columns, place: np.ndarray, values: Columns, metrics: list[str]) -> Columns:
+    """The nominal row: the one with the case_id -1, judged as the others are, or one without results.
+
+    place : int64[0 or 1], where it is in the table
+    """
     known = {dispersion.name: campaign.nominal[dispersion.name] for dispersion in campaign.dispersions}
-    status, reason = (OK, "") if place.size else (NO_RESULT, "the imported table has no case -1, the nominal")
-    row = {**known, "status": STATUS_NAME[status], "reason": reason}
-    row |= {name: values[name][place[0]] if place.size else np.nan for name in metrics}
-    return {name: np.array([value], dtype=object if isinstance(value, str) else None) for name, value in row.items()}
+    if place.size:
+        row = {**known, **_judged(campaign, table, place, {name: values[name][place] for name in metrics})}
+    else:
+        why = "the imported table has no case -1, the nominal"
+        row = {**known, "status": STATUS_NAME[NO_RESULT], "reason": why, **dict.fromkeys(metrics, np.nan)}
+    return {name: typed_column(np.ravel(value).tolist()) for name, value in row.items()}
 
 
 def _read_history(campaign: Campaign, file: Path) -> Columns:

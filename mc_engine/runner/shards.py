@@ -15,6 +15,7 @@ import numpy as np
 import pyarrow as pa
 
 from mc_engine.campaign.loading import Campaign
+from mc_engine.campaign.search import campaign_names
 from mc_engine.errors import StoreError
 from mc_engine.flight.chunks import chunk_size, chunks_of
 from mc_engine.runner.flown_campaign import campaign_of, companions_of
@@ -140,21 +141,25 @@ def _within(missing: Sequence[tuple[int, int]], expected: range) -> bool:
 
 def _commands_of_absent(stores: Sequence[Store], missing: Sequence[tuple[int, int]]) -> list[str]:
     """A command for each shard, of as many as the given ones say there are, that has missing cases and no folder; for
-    the first of them where they are many."""
+    the first of them where they are many.  They fly the campaign file that a shard at hand keeps."""
     records = [store.manifest.get("shard") for store in stores]
     counts = {record["of"] for record in records if record}
-    campaign = stores[0].manifest["campaign"]
+    seed, file = stores[0].manifest["campaign"].get("seed"), _as_campaign(stores[0].path)
     n_cases = stores[0].n_cases
     commands = []
     for of in counts:
         there = {record["number"] for record in records if record and record["of"] == of}
         absent = (shard for shard in _shards_of(of, missing, n_cases) if shard.number not in there)
         commands += [
-            f"`mc-engine run {shell_word(campaign['name'])} --cases {n_cases} --seed {campaign.get('seed')} "
-            f"--shard {shard.number}/{of} --out DIR`"
+            f"`mc-engine run {file} --cases {n_cases} --seed {seed} --shard {shard.number}/{of} --out DIR`"
             for shard in islice(absent, _MOST_COMMANDS + 1)
         ]
     return [*commands[:_MOST_COMMANDS], *["and more"] * (len(commands) > _MOST_COMMANDS)]
+
+
+def _as_campaign(folder: Path) -> str:
+    """The word of a shell for the campaign in a folder, also where a shipped campaign has the folder's name."""
+    return f"./{folder}" if str(folder) in campaign_names() else shell_word(folder)
 
 
 def _shards_of(of: int, ranges: Sequence[tuple[int, int]], n_cases: int) -> Iterator[Shard]:

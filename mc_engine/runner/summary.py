@@ -6,6 +6,7 @@ from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, Any
 
 from mc_engine.errors import StoreError
+from mc_engine.numbers_in_text import percent_digits
 from mc_engine.section import ReportSection
 from mc_engine.shell_words import shell_word
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
@@ -89,7 +90,7 @@ def outcomes(store: Store) -> "tuple[list[Verdict], Verdict | None]":
     counts = LimitCounts(requirements)
     for table, numbers in metric_parts(store, _judged_metrics(requirements)):
         counts.add(numbers.__getitem__, np.ones(table.num_rows, dtype=bool))
-    return judge_counted(counts, None, _design(store), was_looked_at(store.manifest, store.n_cases))
+    return judge_counted(counts, None, _design(store), was_looked_at(store.manifest, store.n_cases, _flown(store)))
 
 
 def _judged_metrics(requirements: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -100,15 +101,21 @@ def _design(store: Store) -> str:
     return str(store.manifest["campaign"].get("design", "mc"))
 
 
+def _flown(store: Store) -> int:
+    return sum(part.rows for part in store.parts)
+
+
 def analyses_line(store: Store) -> str:
     """How the number of cases was determined, if it was not fixed in advance; else empty."""
     from mc_engine.statistics import was_looked_at
 
-    if not was_looked_at(store.manifest, store.n_cases):
+    if not was_looked_at(store.manifest, store.n_cases, _flown(store)):
         return ""
     looks = store.manifest.get("looks", [])
     begun = store.manifest["campaign"]["cases"]
-    if looks:
+    if (flown := _flown(store)) < store.n_cases and not looks:
+        history = f"interrupted after {flown:,} of {store.n_cases:,} cases"
+    elif looks:
         scheduled = sum(look <= store.n_cases for look in looks)
         analyses = f"{scheduled} interim {'analysis' if scheduled == 1 else 'analyses'}"
         history = f"{analyses}, the last at {store.n_cases:,} of at most {looks[-1]:,} cases"
@@ -119,7 +126,7 @@ def analyses_line(store: Store) -> str:
 
 def verdict_line(verdict: "Verdict", units: Mapping[str, str]) -> str:
     """Such as "fuel: pass, mass_kg ≤ 2.5 kg in 9,998 of 10,000 cases (required: 99.73 % with 90 % confidence)"."""
-    required = f"required: {100 * verdict.share:.6g} % with {100 * verdict.confidence:.6g} % confidence"
+    required = f"required: {percent_digits(verdict.share)} % with {percent_digits(verdict.confidence)} % confidence"
     inside = f"in {verdict.passed:,} of {verdict.tried:,} cases"
     asked = "all limits met"
     if verdict.metric:
@@ -176,7 +183,7 @@ def streamed(
         metrics,
         requirements=requirements,
         design=_design(store),
-        looked=was_looked_at(store.manifest, store.n_cases),
+        looked=was_looked_at(store.manifest, store.n_cases, _flown(store)),
         probabilities=QUANTILES if probabilities is None else probabilities,
         confidence=confidence,
     )

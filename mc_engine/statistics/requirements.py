@@ -348,11 +348,12 @@ def _with_limits_shown(verdict: Verdict, judged: Judged, ranked: Callable[[Judge
     return replace(verdict, enclosed=(low, max(low, verdict.at_most - value)))  # midway they may cross by rounding
 
 
-def was_looked_at(manifest: Mapping[str, Any], n_cases: int) -> bool:
-    """Whether the number of cases was not fixed before the first flew: `run --until verdict`, or extended since.
+def was_looked_at(manifest: Mapping[str, Any], n_cases: int, n_flown: int | None = None) -> bool:
+    """Whether the number of cases was not fixed before the first flew: `run --until verdict`, extended or interrupted.
 
     manifest : dict, of the run
     n_cases : int, cases that the run is to have now
+    n_flown : int or None, those that it has; None for all of them
 
     Returns a bool, the argument `looked` of `judge_all`.
 
@@ -361,6 +362,8 @@ def was_looked_at(manifest: Mapping[str, Any], n_cases: int) -> bool:
     >>> was_looked_at({"campaign": {"cases": 1000}}, 2000)
     True
     """
+    if n_flown is not None and n_flown < n_cases and not manifest.get("shard"):
+        return True
     return bool(manifest.get("looks")) or n_cases > manifest.get("campaign", {}).get("cases", n_cases)
 
 

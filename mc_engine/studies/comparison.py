@@ -33,7 +33,7 @@ from mc_engine.studies.run_changes import Difference, campaign_diff, campaign_di
 
 ALPHA = 0.003  # one false alarm in some 300 comparisons; 0.3 sigma is still found with 1000 cases and dozens of metrics
 TOLERANCE = 1e-6  # standard deviations: smaller differences of a pair are rounding
-FLOWN = "completed"
+FLOWN = "completed"  # refused as the name of a requirement
 _RANK = {PASS: 0, NOT_DEMONSTRABLE: 1, FAIL: 2}
 
 
@@ -50,7 +50,8 @@ class Pairing:
 class VerdictChange:
     """A requirement's verdict in each run, by that run's own limits; None where a run has no such requirement.
 
-    inside : by run, how many of its cases are inside the limits, of all.
+    Of paired runs both verdicts are on the pairs alone.  inside : by run, how many of these cases are inside the
+    limits, of all.
     notes : by run, what is to be known of it: which requirement fails the joint verdict or is the only one, and whether
         run B requires something else.
     """
@@ -185,7 +186,7 @@ def compare_runs(
             replace(change, shift_adjusted=next(adjusted), spread_adjusted=next(adjusted)) for change in changes
         ),
         shares=tuple(replace(share, adjusted=next(adjusted)) for share in shares),
-        verdicts=_verdict_changes(manifests, tables, ok),
+        verdicts=_verdict_changes(manifests, tables, ok, pairing),
         units={name: str(facts[1][name].get("unit", "")) for name in metrics},
         left_out=left_out,
         code=code_differences(*manifests),
@@ -255,8 +256,18 @@ def _cases_inside(manifest: Mapping[str, Any], values: list[dict[str, np.ndarray
     }
 
 
-def _verdict_changes(manifests: Any, tables: Any, ok: Any) -> tuple[VerdictChange, ...]:
-    judged_runs = [_judged(*run) for run in zip(manifests, tables, ok, strict=True)]
+def _verdict_changes(manifests: Any, tables: Any, ok: Any, pairing: Pairing) -> tuple[VerdictChange, ...]:
+    """The verdicts of both runs: on the same cases and with the same bounds where they are paired, else on all."""
+    looked = [
+        was_looked_at(manifest, max(len(table), int(manifest["campaign"].get("cases", 0))), len(table))
+        for manifest, table in zip(manifests, tables, strict=True)
+    ]
+    if pairing.paired:
+        looked = 2 * [any(looked)]
+    judged_runs = [
+        _judged(manifest, table.iloc[rows], flown[rows], sight)
+        for manifest, table, flown, rows, sight in zip(manifests, tables, ok, pairing.rows, looked, strict=True)
+    ]
     changes = []
     for name in dict.fromkeys(verdict for judged in judged_runs for verdict in judged):
         ends = [_verdict_on(name, judged) for judged in judged_runs]
@@ -267,12 +278,12 @@ def _verdict_changes(manifests: Any, tables: Any, ok: Any) -> tuple[VerdictChang
     return tuple(changes)
 
 
-def _judged(manifest: Mapping[str, Any], table: pd.DataFrame, flown: np.ndarray) -> dict[str, Verdict]:
+def _judged(manifest: Mapping[str, Any], table: pd.DataFrame, flown: np.ndarray, looked: bool) -> dict[str, Verdict]:
     """The verdicts of a run by the names of its requirements, the joint one among them."""
     design = str(manifest["campaign"].get("design", "mc"))
     records = manifest.get("requirements", []) if design in SAMPLING_DESIGNS else []
     columns = {record["metric"]: table[record["metric"]].to_numpy(dtype=np.float64) for record in records}
-    judged, joint = judge_all(records, columns.__getitem__, flown, design, was_looked_at(manifest, len(table)))
+    judged, joint = judge_all(records, columns.__getitem__, flown, design, looked)
     return {verdict.name: verdict for verdict in [*judged, *([joint] if joint else [])]}
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mc_engine.campaign.cases import case_table, full_inputs
+from mc_engine.campaign.cases import case_table, full_inputs, is_endless
 from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import ModelError
 from mc_engine.flight import flight
@@ -69,13 +69,15 @@ class Timing:
 
 def campaign_flight(campaign: Campaign, n_cases: int | None = None) -> Flight:
     """The first cases of a campaign, by default as many as fly in a short time; its nominal, `n_cases` times,
-    where the inputs come from another run.
+    where the inputs come from a run that has yet to be flown.
+
+    More cases than the campaign's own number are those of a longer campaign, or all where its design cannot be longer.
     """
     model = compiled_model(campaign.model)
 
     def of(n: int) -> Flight:
-        table = {} if campaign.first is not None else case_table(campaign, np.arange(min(n, campaign.cases)))
-        n = n if campaign.first is not None else min(n, campaign.cases)
+        n = n if campaign.first is not None or is_endless(campaign) else min(n, campaign.cases)
+        table = {} if campaign.first is not None else case_table(campaign, np.arange(n))
         inputs = full_inputs(campaign, table)
         return Flight(campaign.name, model, campaign.directory, inputs, n, campaign.seed)
 

@@ -48,8 +48,9 @@ def estimate_rare_event(
     """Estimate the probability of not meeting a requirement and leave the result in the new directory `out`.
 
     requirement : its name; the only one by default.  method : one of METHODS.  progress : called with the numbers of
-    cases flown and failed.  The interval holds with the confidence of the campaign's [report].  Raises RunInterrupted
-    on Ctrl-C; nothing is stored then.
+    cases flown and failed.  The interval holds with the confidence of the campaign's [report], or with the greater one
+    at which its upper end alone holds with the confidence that the requirement asks for.  Raises RunInterrupted on
+    Ctrl-C; nothing is stored then.
     """
     path = Path(out) if out is not None else default_folder(f"{campaign.name}-rare")
     chosen = chosen_requirement(campaign, requirement)
@@ -73,7 +74,7 @@ def estimate_rare_event(
                 cases_per_level=cases_per_level,
                 seed=campaign.seed,
                 noise=True,
-                confidence=campaign.report.confidence,
+                confidence=max(campaign.report.confidence, round(2.0 * chosen.confidence - 1.0, 12)),
             )
         except ValueError as error:
             raise CampaignError(campaign.name, [Problem("--cases-per-level", str(error))]) from None

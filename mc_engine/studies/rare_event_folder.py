@@ -11,6 +11,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mc_engine.numbers_in_text import percent_digits
 from mc_engine.store.result_folder import read_result
 from mc_engine.store.run_files import RARE_EVENT
 
@@ -63,14 +64,15 @@ def requirement_words(result: dict[str, Any]) -> str:
 
 def probability_words(result: dict[str, Any]) -> str:
     """The estimate, its interval, and what the requirement allows."""
-    allowed = 1.0 - result["requirement"]["share"]
+    allowed, sure = 1.0 - result["requirement"]["share"], percent_digits(result["requirement"]["confidence"])
+    allows = f"the requirement allows {allowed:.3g} with {sure} % confidence"
     lower, upper = printed_interval(result)
     if not result["probability"]:
-        return f"below {upper:.3g}; no case failed (the requirement allows {allowed:.3g})"
-    interval = f"{100.0 * result['confidence']:.6g} % interval {lower:.3g} to {upper:.3g}"
+        return f"below {upper:.3g}; no case failed ({allows})"
+    interval = f"{percent_digits(result['confidence'])} % interval {lower:.3g} to {upper:.3g}"
     return (
-        f"{result['probability']:.3g} of not meeting it, {interval}, by {METHOD_WORDS[result['method']]}; the "
-        f"requirement allows {allowed:.3g}, so it is {standing(result)}"
+        f"{result['probability']:.3g} of not meeting it, {interval}, by {METHOD_WORDS[result['method']]}; "
+        f"{allows}, so it is {standing(result)}"
     )
 
 

@@ -13,7 +13,7 @@ from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.run.chosen_units import spread_text
 from reports.run.contributions import MOST_METRICS, UNEXPLAINED, Contributions, Contributor, surely
 from reports.run.flown import Flown
-from reports.text.numbers import count, counted, fixed, number, percent
+from reports.text.numbers import count, counted, fixed, given_percent, number
 
 _TRENDS = {"src": "SRC", "prcc": "PRCC", "spearman": "Spearman"}
 
@@ -126,7 +126,7 @@ def _finite(value: float) -> float | None:
 
 
 def _note(flown: Flown, contributions: Contributions, shown: list[str]) -> str:
-    each = f"In brackets: {percent(flown.stated.confidence)} confidence interval."
+    each = f"In brackets: {given_percent(flown.stated.confidence)} confidence interval."
     rows = [row for metric in shown for row in strongest(contributions.by_metric[metric])]
     if any(_beyond_total(row) for row in rows):
         each += (

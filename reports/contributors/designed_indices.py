@@ -11,7 +11,7 @@ from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.run.contributions import Contributor
 from reports.run.flown import Flown
 from reports.run.outcomes import ALL_LIMITS, inside, inside_words
-from reports.text.numbers import axis_label, count, number, percent
+from reports.text.numbers import axis_label, count, given_percent, number
 
 MOST_METRICS = 8
 MOST_INPUTS = 12  # of a metric in the table
@@ -89,13 +89,13 @@ def _index_table(
             "Sobol’ indices of Saltelli’s blocks",
             columns,
             tuple(rows),
-            _saltelli_note(designed, percent(flown.stated.confidence)),
+            _saltelli_note(designed, given_percent(flown.stated.confidence)),
         )
     return Table(
         "Elementary effects of Morris’s trajectories",
         columns,
         tuple(rows),
-        _morris_note(percent(flown.stated.confidence)),
+        _morris_note(given_percent(flown.stated.confidence)),
     )
 
 

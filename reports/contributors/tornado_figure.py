@@ -9,7 +9,7 @@ from reports.drawing.marks import Drawing
 from reports.figures.rows import tornado
 from reports.run.contributions import UNEXPLAINED, Contributor
 from reports.run.flown import Flown
-from reports.text.numbers import number, percent
+from reports.text.numbers import given_percent, number
 
 MOST_METRICS = 6  # of the figure
 STRONGEST = 5  # of a metric
@@ -22,7 +22,7 @@ def contributor_figure(
 ) -> FigureBlock:
     """by_metric : words and contributors of each metric.  source : what the effects were estimated from."""
     panels, told, totals = [], [], False
-    interval = f"{percent(flown.stated.confidence)} confidence"
+    interval = f"{given_percent(flown.stated.confidence)} confidence"
     for words, contributors in list(by_metric)[:MOST_METRICS]:
         rows = strongest(contributors)
         names = [name_of(flown, row.input) for row in rows]

@@ -8,7 +8,7 @@ import numpy as np
 from mc_engine.statistics import Quantile, Summary
 from reports.drawing.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot
 from reports.drawing.palette import BLUE, GREEN, INK, ORANGE, SKY, VERMILION
-from reports.text.numbers import count, counted, interval, limit_number, number, percent
+from reports.text.numbers import count, counted, given_percent, interval, limit_number, number
 
 FEWEST_BINS, MOST_BINS = 8, 48
 CENTRAL = (0.005, 0.995)  # what a histogram must show well
@@ -93,15 +93,19 @@ def _bounds(quantiles: Sequence[Quantile], confidence: float, top: float) -> Bar
     """Intervals of the quantiles, as high as the panel."""
     ends = [(q.lower, q.upper) for q in quantiles if q.lower is not None and q.upper is not None]
     left, right = np.array(ends).reshape(-1, 2).T
-    key = f"{percent(0.5 * (1.0 + confidence))} confidence bounds of a percentile, distribution-free" if ends else ""
+    key = (
+        f"{given_percent(0.5 * (1.0 + confidence))} confidence bounds of a percentile, distribution-free"
+        if ends
+        else ""
+    )
     return Bar(left, right, np.zeros(left.size), np.full(left.size, top), BLUE, 0.3, key=key)
 
 
 def _percentile_lines(quantiles: Sequence[Quantile], outer: Sequence[float], with_intervals: bool) -> Iterator[Limit]:
-    both = f"{' and '.join(percent(p, 3) for p in outer)} percentiles"
+    both = f"{' and '.join(given_percent(p) for p in outer)} percentiles"
     for q in quantiles:
         bounds = f" {interval(q.lower, q.upper)}" if with_intervals else ""
-        words = f"{percent(q.probability, 3)} percentile {number(q.value)}{bounds}"
+        words = f"{given_percent(q.probability)} percentile {number(q.value)}{bounds}"
         colour, dash, key = (ORANGE, "solid", "median") if q.probability == 0.5 else (BLUE, "dash", both)
         yield Limit(q.value, "x", colour, words, dash, key=key)
 

@@ -8,7 +8,7 @@ import scipy  # loads its packages when they are used
 from mc_engine.statistics.drivers import SuccessCurve
 from reports.drawing.marks import Axis, Bar, Limit, Line, Mark, Plot, Points, between, intervals, names_axis
 from reports.drawing.palette import BLUE, INK, MUTED, SKY, VERMILION, blended
-from reports.text.numbers import count, limit_number, number, percent
+from reports.text.numbers import count, given_percent, limit_number, number, percent
 
 WEAK = "#f7f7f7"  # the colour of no correlation
 LIGHT = 0.6  # a cell of a weaker correlation is light, and takes black numbers
@@ -28,7 +28,9 @@ def success_panel(requirement: str, label: str, curve: SuccessCurve, overall: fl
         for label, passed, tried, share in zip(where, curve.passed, curve.tried, fraction, strict=True)
     ]
     extents = [] if names else [intervals(curve.low, curve.high, fraction, MUTED, "extent of the bin")]
-    key = f"fraction of a bin's cases that pass, at its median, with {percent(confidence)} Clopper–Pearson interval"
+    key = (
+        f"fraction of a bin's cases that pass, at its median, with {given_percent(confidence)} Clopper–Pearson interval"
+    )
     marks: tuple[Mark, ...] = (
         *extents,
         intervals(100.0 * curve.lower, 100.0 * curve.upper, place, BLUE, upright=True),
@@ -77,7 +79,7 @@ def probability_plot(
     ranks = shown_ranks(n)
     tails = (0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence)
     low, high = (scipy.special.ndtri(scipy.special.betaincinv(ranks + 1, n - ranks, p)) for p in tails)
-    normal = f"normal distribution with the same mean and σ, with {percent(confidence)} band of every rank"
+    normal = f"normal distribution with the same mean and σ, with {given_percent(confidence)} band of every rank"
     ends = z[[0, -1]]
     marks: list[Mark] = [
         between(mean + deviation * z[ranks], low, high, SKY, 0.35),

@@ -24,7 +24,7 @@ from reports.footprint.landings import KILOMETRES, Landing, height_limit, landin
 from reports.footprint.map_files import MapOutline, Mark, Places, geojson, kml
 from reports.run.flown import Flown
 from reports.sections.figure_blocks import thinned_rows
-from reports.text.numbers import count, counted, interval, number, percent
+from reports.text.numbers import count, counted, given_percent, interval, number, percent
 
 DRAWN_REGION = 0.9  # content of the one region in the figure; more would hide the ellipses
 DISTANCES = (0.5, 0.9, 0.99)
@@ -174,7 +174,7 @@ def _outlines(footprint: Footprint) -> Iterator[Line]:
 
 
 def _name(region: Ellipse | DensityRegion) -> str:
-    content = percent(region.content)
+    content = given_percent(region.content)
     return f"{content} ellipse" if isinstance(region, Ellipse) else f"at least {content} region"
 
 
@@ -195,13 +195,16 @@ def _region_table(flown: Flown, landing: Landing) -> Table:
     note = (
         "Ellipses: covariance of the cases in the plane about the mean impact point, scaled by k = √(−2 ln(1 − P)) for "
         f"the content P of a normal distribution of known covariance{bigger}. Fraction inside: counted, with its "
-        f"{percent(flown.stated.confidence)} Clopper–Pearson interval; where that excludes the stated content, the "
-        "distribution is not normal. Lengths are geodesics through the mean impact point, the farthest case "
+        f"{given_percent(flown.stated.confidence)} Clopper–Pearson interval; where that excludes the stated content, "
+        "the distribution is not normal. Lengths are geodesics through the mean impact point, the farthest case "
         f"{number(regions.reach / 1000.0, 3)} km from it; across them the plane stretches by at most "
         f"{percent(max(regions.plane.stretch(regions.reach), LEAST_STRETCH), 3, up=True)}."
     )
     return Table(
-        f"Regions of the {count(landing.rows.size)} of {count(flown.n_held)} cases that came down", columns, rows, note
+        f"Regions of the {count(landing.rows.size)} of {count(flown.n_held)} cases that came down{flown.sample_words}",
+        columns,
+        rows,
+        note,
     )
 
 
@@ -216,9 +219,9 @@ def _region_row(region: Ellipse | DensityRegion, confidence: float) -> tuple[Cel
         return (
             Cell(
                 "distribution-free region",
-                small=f"{_parts(len(region.outlines))}, {percent(region.confidence)} confidence",
+                small=f"{_parts(len(region.outlines))}, {given_percent(region.confidence)} confidence",
             ),
-            Cell(percent(region.content), region.content),
+            Cell(given_percent(region.content), region.content),
             *inside,
             Cell("–"),
             Cell("–"),
@@ -227,7 +230,7 @@ def _region_row(region: Ellipse | DensityRegion, confidence: float) -> tuple[Cel
     north = float(np.degrees(0.5 * np.pi - region.direction)) % 180.0
     return (
         Cell("covariance ellipse"),
-        Cell(percent(region.content), region.content, f"k = {region.scale:.3f}"),
+        Cell(given_percent(region.content), region.content, f"k = {region.scale:.3f}"),
         *inside,
         Cell(f"{number(a, 4)} × {number(b, 4)}", a),
         Cell(f"{north:.1f}", north),
@@ -251,7 +254,7 @@ def _distance_table(flown: Flown, landing: Landing) -> Table | None:
     if landing.rows.size < 2:
         return None
     places = [landing.centre, *([landing.aim] if landing.aim is not None and landing.aim != landing.centre else [])]
-    titles = [percent(p) for p in _distances(flown)]
+    titles = [given_percent(p) for p in _distances(flown)]
     columns = (
         Column("Distance from", "text"),
         Column("Used / tried", "number"),
@@ -259,7 +262,7 @@ def _distance_table(flown: Flown, landing: Landing) -> Table | None:
         Column("Largest [km]", "number"),
     )
     rows = tuple(_distance_row(flown, landing, place) for place in places)
-    each = percent(flown.stated.confidence)
+    each = given_percent(flown.stated.confidence)
     metric = f"From the target: the metric {flown.words(landing.miss)}, as the model computes it. "
     note = metric * bool(landing.miss) + (
         f"50 % of the cases end within the first distance; from the {landing.centre.name} it is the circular error "
@@ -267,7 +270,7 @@ def _distance_table(flown: Flown, landing: Landing) -> Table | None:
         if flown.random
         else "Percentiles of the flown cases, not of a population." * bool(titles)
     )
-    return Table("Distances along the ground", columns, rows, note)
+    return Table(f"Distances along the ground{flown.sample_words}", columns, rows, note)
 
 
 def _distances(flown: Flown) -> tuple[float, ...]:

@@ -116,7 +116,7 @@ class HeldCases:
     @cached_property
     def judgement(self) -> tuple[list[Verdict], Verdict | None]:
         """A verdict per requirement, and the one on all at once."""
-        looked = was_looked_at(self.manifest, self.n_wanted)
+        looked = was_looked_at(self.manifest, self.n_wanted, self.n_tried)
         design = str(self.manifest.get("campaign", {}).get("design", "mc"))
         return judge_all(self.requirements, self.values, self.ok, design, looked)
 

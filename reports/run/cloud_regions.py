@@ -12,7 +12,7 @@ from mc_engine.statistics.regions import covariance_ellipses, density_regions
 from reports.drawing.marks import Line
 from reports.figures.clouds import outline
 from reports.run.flown import Flown, Stated
-from reports.text.numbers import count, percent
+from reports.text.numbers import count, given_percent, percent
 
 MIDDLE = 0.5  # the fraction in the inner ellipse
 FEWEST = 20  # cases, and different numbers of each metric
@@ -49,11 +49,11 @@ def _regions(
     if all((ranges[0] <= curve).all() and (curve <= ranges[1]).all() for _, curve in ellipses):
         for nth, (ellipse, curve) in enumerate(ellipses):
             held = f"holds {count(ellipse.inside)} of {n} cases, {percent(ellipse.inside / ellipse.n, 1)}"
-            text = f"{percent(ellipse.content, 3)} ellipse of a normal distribution: {held}"
+            text = f"{given_percent(ellipse.content)} ellipse of a normal distribution: {held}"
             yield outline("ellipse", text, (curve,), nth)
     for region in density_regions(points, contents[1:], stated.confidence, THINNEST):
         text = (
-            f"distribution-free region, at least {percent(region.content, 3)} with {percent(region.confidence)} "
-            f"confidence: holds {count(region.inside)} of {n} cases"
+            f"distribution-free region, at least {given_percent(region.content)} with "
+            f"{given_percent(region.confidence)} confidence: holds {count(region.inside)} of {n} cases"
         )
         yield outline("region", text, [np.clip(placed(curve), *ranges) for curve in region.outlines])

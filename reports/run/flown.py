@@ -250,7 +250,7 @@ class Flown:
     @property
     def looked(self) -> bool:
         """Whether the number of cases was decided by looking at them."""
-        return was_looked_at(self.manifest, self.n_wanted)
+        return was_looked_at(self.manifest, self.n_wanted, self.n_tried)
 
     @cached_property
     def key_metrics(self) -> list[str]:

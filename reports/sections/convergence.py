@@ -15,7 +15,7 @@ from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.drawing.marks import Axis, Drawing, Line, Plot, between
 from reports.drawing.palette import BLUE, SKY
 from reports.run.flown import Flown
-from reports.text.numbers import count, interval, number, percent, percentile
+from reports.text.numbers import count, given_percent, interval, number, percent, percentile
 
 MOST_METRICS = 8
 MOST_DRAWN = 4
@@ -44,7 +44,7 @@ def convergence_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
 
 def _estimate_panel(flown: Flown, name: str, run: RunningEstimate) -> Plot:
     """One estimate and its bounds over the number of cases."""
-    what, interval = _estimate_words(run), f"{percent(flown.stated.confidence)} confidence bounds"
+    what, interval = _estimate_words(run), f"{given_percent(flown.stated.confidence)} confidence bounds"
     band_key = f"{interval}, where the cases are enough for both ends"
     key = "from the first so many cases, in the order of their numbers"
     marks = (
@@ -80,7 +80,7 @@ def _convergence_table(flown: Flown, told: dict[str, tuple[RunningEstimate, ...]
     )
     rows = tuple(_estimate_row(flown, name, run) for name, pair in told.items() for run in pair)
     note = (
-        f"Converged: the {percent(flown.stated.confidence)} bounds of the estimate lie no farther from it than "
+        f"Converged: the {given_percent(flown.stated.confidence)} bounds of the estimate lie no farther from it than "
         f"{number(CLOSE_MEAN)} standard deviations of the metric for a mean, {number(CLOSE_QUANTILE)} for a percentile "
         "(column “bounds within”), and the first and second half of the cases do not differ beyond chance "
         f"(probability at least {percent(DRIFT)}; Welch’s test of the means, Fisher’s of the cases beyond the "

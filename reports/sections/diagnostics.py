@@ -75,7 +75,7 @@ def normal_probability_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     panels = []
     for name in names:
         values = flown.values(name)
-        order = np.argsort(values, kind="stable")[: flown.summaries[name].n_used]
+        order = np.argsort(values, kind="stable")[: np.count_nonzero(np.isfinite(values))]
         limits = flown.limits(name)
         drawn = tuple(at for at in (limits.at_least, limits.at_most) if at is not None)
         panels.append(

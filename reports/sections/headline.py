@@ -10,7 +10,7 @@ from reports.document.blocks import Card
 from reports.run.flown import URGENCY, Flown
 from reports.sections.requirement_tables import demonstrated_text
 from reports.sections.tables import TONES, limit_text
-from reports.text.numbers import count, limit_number, number, percent, percentile, with_unit
+from reports.text.numbers import count, given_percent, limit_number, number, percent, percentile, with_unit
 
 MOST_COSTS = 4
 
@@ -26,7 +26,7 @@ def _verdict_card(flown: Flown, verdict: Verdict) -> Card:
     asked = "inside every limit"
     if verdict.metric:
         asked = f"{flown.words(verdict.metric)} {limit_text(verdict, flown.unit(verdict.metric))}"
-    wanted = f"{percent(verdict.share, 3)} of cases, {percent(verdict.confidence)} confidence"
+    wanted = f"{given_percent(verdict.share)} of cases, {given_percent(verdict.confidence)} confidence"
     counted = f"{count(verdict.passed)} of {count(verdict.tried)} cases inside"
     return Card(
         label=verdict.name,
@@ -95,19 +95,20 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
 
 
 def _demonstrated(flown: Flown, name: str, limits: Limits) -> str:
-    """What the verification matrix says is demonstrated of a metric, in the same digits; empty without it."""
+    """What the verification matrix says is demonstrated of a metric by the requirement with these limits, in the same
+    digits; empty without it."""
     for verdict in flown.verdicts:
         known = verdict.enclosed if limits.two_sided else verdict.demonstrated
         shown = verdict.at_most == limits.at_most and verdict.at_least == limits.at_least
-        if verdict.metric == name and known is not None and (shown or not limits.two_sided):
-            where = f"in {percent(verdict.share, 3)} of cases, {percent(verdict.confidence)} confidence"
+        if verdict.metric == name and known is not None and shown:
+            where = f"in {given_percent(verdict.share)} of cases, {given_percent(verdict.confidence)} confidence"
             return f"{demonstrated_text(verdict, flown.unit(name))} {where}"
     return ""
 
 
 def _tails(flown: Flown, summary: Summary) -> Iterator[str]:
     """Outer percentiles with their confidence bounds, those that the cases are enough for."""
-    each = percent(flown.stated.confidence)
+    each = given_percent(flown.stated.confidence)
     for probability in flown.stated.outer if flown.random else ():
         quantile, upper = summary.at(probability), probability > 0.5
         bound = None if quantile is None else (quantile.upper if upper else quantile.lower)
@@ -184,6 +185,8 @@ def _how_looked_at(flown: Flown) -> str:
             f"The run was to end once every requirement passes or fails, with interim analyses after {steps} cases; "
         )
         story += f"it ended after {flown_so_far}."
+    elif flown.n_tried < flown.n_wanted:
+        story = f"The run was interrupted after {count(flown.n_tried)} of {flown_so_far} cases."
     else:
         begun = count(int(flown.campaign.get("cases", 0)))
         story = f"The run began with {begun} cases and was extended to {flown_so_far} after their results were known."

@@ -11,7 +11,7 @@ from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.drawing.marks import Drawing, Plot
 from reports.figures.rows import SPREAD, level_panel
 from reports.run.flown import Flown
-from reports.text.numbers import axis_label, count, interval, number, percent
+from reports.text.numbers import axis_label, count, given_percent, interval, number, percent
 
 MOST_LEVELS = 20
 MOST_METRICS = 8
@@ -51,7 +51,7 @@ def _compared(flown: Flown, name: str, levels: list[str]) -> Iterator[FigureBloc
     rows = [np.flatnonzero(choice == level) for level in levels]
     plots = tuple(_metric_panel(flown, metric, levels, rows) for metric in metrics)
     yield FigureBlock(
-        f"Metrics by {flown.words(name)}. {_pairs_said(flown, matched)}",
+        f"Metrics by {flown.words(name)}{flown.sample_words}. {_pairs_said(flown, matched)}",
         Drawing(f"Metrics by {flown.words(name)}", plots),
         "half",
     )
@@ -94,7 +94,7 @@ def _level_table(
         Column("Used / tried", "number"),
         *((Column("Smallest", "number"),) if flown.chosen else ()),
         Column("Median", "number"),
-        *(() if flown.chosen else (Column(percent(flown.stated.probability, 3), "number"),)),
+        *(() if flown.chosen else (Column(given_percent(flown.stated.probability), "number"),)),
         Column("Largest", "number"),
         Column(f"Median difference to {levels[0]}", "number"),
         Column(f"Smaller than {levels[0]}", "number"),
@@ -117,7 +117,7 @@ def _level_table(
         largest = Cell(number(summary.maximum, 4, summary.spread), summary.maximum)
         against = _difference_cells(flown, values, matched, place)
         body.append((Cell(level), used, *cells, largest, *against))
-    title = f"{axis_label(flown.words(metric), flown.unit(metric))} by {flown.words(name)}"
+    title = f"{axis_label(flown.words(metric), flown.unit(metric))} by {flown.words(name)}{flown.sample_words}"
     return Table(
         title[:1].upper() + title[1:], columns, tuple(body), _pairing_note(flown, levels[0], bool(len(matched)))
     )
@@ -162,7 +162,7 @@ def _pairing_note(flown: Flown, first: str, paired: bool) -> str:
         return (
             note + "Below the median: smallest to largest difference; the cases were chosen, so there is no interval."
         )
-    share = percent(flown.stated.confidence)
+    share = given_percent(flown.stated.confidence)
     return note + (
         f"In brackets: {share} distribution-free interval of the median (sign test) and Clopper–Pearson interval of "
         "the fraction of pairs, for pairs that were drawn independently."

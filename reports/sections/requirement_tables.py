@@ -10,7 +10,7 @@ from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.figures.rows import margin_figure
 from reports.run.flown import Flown
 from reports.sections.tables import TONES, limit_text
-from reports.text.numbers import SPACE, beside_limit, count, number, percent, with_unit
+from reports.text.numbers import SPACE, beside_limit, count, given_percent, number, percent, with_unit
 from reports.text.source_places import of_source
 
 
@@ -90,7 +90,7 @@ def _bounds_named(flown: Flown) -> str:
         return "the Clopper–Pearson bounds, each holding with the confidence required"
     return (
         "bounds that hold, each with the confidence required, at every number of cases at once (Robbins’ mixture): "
-        "the number of cases was decided by interim analyses"
+        "the number of cases was not fixed in advance"
     )
 
 
@@ -99,7 +99,7 @@ def _requirement_row(flown: Flown, verdict: Verdict, source: str) -> tuple[Cell,
     lost = f"{count(verdict.no_number)} without a number" if verdict.no_number else ""
     bounds = f"[{percent(verdict.lower)}, {percent(verdict.upper, up=True)}]" if verdict.lower is not None else ""
     needed = f"needs {count(verdict.needed)} cases" if verdict.needed else ""
-    asked = f"for {percent(verdict.share, 3)} with {percent(verdict.confidence)} confidence"
+    asked = f"for {given_percent(verdict.share)} with {given_percent(verdict.confidence)} confidence"
     what = "; ".join(filter(None, (flown.words(verdict.metric), of_source(source))))
     return (
         Cell(verdict.name, small=what),
@@ -150,7 +150,7 @@ def risk_table(flown: Flown) -> Table | None:
     note = f"Allowed outside: the most of these {count(flown.n_tried)} cases with which the requirement still passes. "
     if flown.looked:
         note += (
-            "The number of cases was decided by interim analyses: the consumer’s risk is then below the figure given, "
+            "The number of cases was not fixed in advance: the consumer’s risk is then below the figure given, "
             "whatever the stopping rule, and the producer’s risk has no figure. "
         )
     if len(flown.verdicts) > 1:

@@ -1,6 +1,6 @@
 """The tables of results: verdicts, summaries, quantiles, published values, statuses, worst cases."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from reports.text.numbers import (
     count,
     exact,
     fixed,
+    given_percent,
     interval,
     limit_number,
     number,
@@ -86,7 +87,7 @@ def range_table(flown: Flown) -> Table:
             metric_cell(flown, name),
             Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used),
             Cell(number(flown.nominal_value(name), scale=summary.spread), flown.nominal_value(name)),
-            *(_end_cell(flown, name, summary, end) for end in (np.nanmin, np.nanmax)),
+            *(_end_cell(flown, name, summary, end) for end in (summary.minimum, summary.maximum)),
         )
         for name, summary in flown.summaries.items()
         if summary.n_used
@@ -99,17 +100,17 @@ def range_table(flown: Flown) -> Table:
     return Table("Ranges of the metrics", columns, rows, note)
 
 
-def _end_cell(flown: Flown, name: str, summary: Summary, end: Callable[[np.ndarray], float]) -> Cell:
+def _end_cell(flown: Flown, name: str, summary: Summary, value: float | None) -> Cell:
     """The smallest or the largest value, and where it is: not known of a table that is a sample."""
-    values = flown.values(name)
-    value = float(end(values))
-    rows = np.flatnonzero(values == value)
+    if flown.sampled:
+        return Cell(number(value, scale=summary.spread), value)
+    rows = np.flatnonzero(flown.values(name) == value)
     where = f"case {count(int(flown.case_ids[rows[0]]))}: {not_nominal(flown, int(rows[0]))}"
     if summary.constant:
         where = "all cases with a number"
     elif rows.size > 1:
         where = f"{count(rows.size)} cases, first {where}"
-    return Cell(number(value, scale=summary.spread), value, small="" if flown.sampled else where)
+    return Cell(number(value, scale=summary.spread), value, small=where)
 
 
 def metric_cell(flown: Flown, name: str) -> Cell:
@@ -137,7 +138,7 @@ def quantile_table(flown: Flown) -> Table | None:
     columns = (
         Column("Metric", "text"),
         Column("Used / tried", "number"),
-        *(Column(percent(probability, 3), "number") for probability in shown),
+        *(Column(given_percent(probability), "number") for probability in shown),
     )
     rows = []
     for name, summary in drawn.items():
@@ -152,7 +153,7 @@ def quantile_table(flown: Flown) -> Table | None:
         ]
         used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
         rows.append((Cell(axis_label(flown.words(name), flown.unit(name))), used, *cells))
-    each = percent(flown.stated.confidence)
+    each = given_percent(flown.stated.confidence)
     note = (
         f"In brackets: distribution-free limits from order statistics, each holding with {each}{_for_fixed(flown)}; "
         if flown.random

@@ -31,7 +31,7 @@ from reports.run.chosen_units import ShownRun, chosen_unit
 from reports.run.flown import Flown, Run
 from reports.studies.comparison_figure import change_figure
 from reports.studies.comparison_overlays import overlay_blocks
-from reports.text.numbers import SPACE, axis_label, count, fixed, number, percent, words
+from reports.text.numbers import SPACE, axis_label, count, fixed, given_percent, number, percent, words
 
 LEAST_P = 1e-12  # a smaller p-value means no more
 ROUNDING = 1e-12  # of a mean: a smaller standard deviation is none
@@ -62,8 +62,10 @@ GLOSSARY = Terms(
             "tests",
             "Paired: Wilcoxon’s signed ranks of the differences, and of the distances to each run’s own median; "
             "McNemar’s exact test of a fraction. Unpaired: normal scores, Brown and Forsythe’s test, Fisher’s exact "
-            "test. They are distribution-free. Each size and interval of a metric is of the quantity that its test is "
-            "of: the interval excludes no change exactly where the test, by itself, finds one.",
+            "test. Those of shifts and fractions are distribution-free; those of spread are approximate, with more "
+            "false alarms where a metric has a long tail on one side. Each size and interval of a metric is of the "
+            "quantity that its test is of: the interval excludes no change exactly where the test, by itself, finds "
+            "one.",
         ),
         (
             "intervals",
@@ -242,7 +244,7 @@ def _metric_table(comparison: Comparison, units: Mapping[str, str], moved: list[
     )
     note = (
         "Significant changes first, each kind by its size. "
-        f"Small: the {percent(comparison.confidence)} interval of the quantity that the test "
+        f"Small: the {given_percent(comparison.confidence)} interval of the quantity that the test "
         "is of; cases used of cases flown. σ: standard deviation of run A. *: significant, for better or worse. "
         "–: no size, as a run has no spread, or ties hide it."
     )

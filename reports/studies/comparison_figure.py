@@ -9,7 +9,7 @@ from mc_engine.studies.comparison import Comparison
 from reports.document.blocks import FigureBlock
 from reports.drawing.marks import Drawing
 from reports.figures.rows import change_panel, difference_scale, ratio_scale
-from reports.text.numbers import percent, words
+from reports.text.numbers import given_percent, words
 
 MOST_ROWS = 40  # of the figure
 ROWS_TOGETHER = 18  # of a panel: a lower one finds room on a page that is begun
@@ -22,7 +22,7 @@ def change_figure(comparison: Comparison, moved: list[MetricChange]) -> FigureBl
     caption = "How far each metric moved and how much its spread changed from run A to run B"
     if len(shown) < len(moved):
         caption += f"; the {len(shown)} of {len(moved)} metrics with the largest changes"
-    interval = percent(comparison.confidence)
+    interval = given_percent(comparison.confidence)
     shifted, spread = (np.array([getattr(item, p) <= comparison.alpha for item in shown], dtype=bool)
                        for p in ("shift_adjusted", "spread_adjusted"))  # fmt: skip
     shifts = _ends([item.shift_in_sigma for item in shown], 0.0, shifted)

@@ -5,7 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.studies.rare_event_folder import RareEventRecord, accepted_percent, plain_cases, printed_interval
+from mc_engine.studies.rare_event_folder import (
+    RareEventRecord,
+    accepted_percent,
+    plain_cases,
+    printed_interval,
+    standing,
+)
 from reports.document.blocks import (
     Block,
     Card,
@@ -31,6 +37,7 @@ from reports.text.numbers import (
     axis_label,
     count,
     exact,
+    given_percent,
     named,
     number,
     percent,
@@ -51,6 +58,7 @@ METHODS = {
     "cross-entropy": "importance sampling by cross entropy",
     "plain": "plain Monte Carlo",
 }
+TONES = {"met": "good", "not met": "bad", "open": "open"}
 GLOSSARY = Terms(
     (
         (
@@ -115,8 +123,8 @@ def build_rare_event(record: RareEventRecord, name: str) -> Document:
 def _estimate_sentence(result: dict[str, Any]) -> str:
     event = f"P({_event(result)})"
     if not result["probability"]:
-        return f"No case failed: {event} < {number(printed_interval(result)[1], 3)}. Requirement {_judged(result)[0]}."
-    return f"{event} = {number(result['probability'], 3)} ({_interval(result)}). Requirement {_judged(result)[0]}."
+        return f"No case failed: {event} < {number(printed_interval(result)[1], 3)}. Requirement {standing(result)}."
+    return f"{event} = {number(result['probability'], 3)} ({_interval(result)}). Requirement {standing(result)}."
 
 
 def _event(result: dict[str, Any]) -> str:
@@ -129,15 +137,7 @@ def _event(result: dict[str, Any]) -> str:
 
 def _interval(result: dict[str, Any]) -> str:
     lower, upper = printed_interval(result)
-    return f"{percent(result['confidence'])} confidence interval {number(lower, 3)} to {number(upper, 3)}"
-
-
-def _judged(result: dict[str, Any]) -> tuple[str, str]:
-    """The verdict and its tone."""
-    allowed = 1.0 - result["requirement"]["share"]
-    if result["upper"] <= allowed:
-        return "met", "good"
-    return ("not met", "bad") if result["lower"] > allowed else ("open", "open")
+    return f"{given_percent(result['confidence'])} confidence interval {number(lower, 3)} to {number(upper, 3)}"
 
 
 def _estimate_facts(record: RareEventRecord) -> tuple[tuple[str, str], ...]:
@@ -155,11 +155,13 @@ def _estimate_facts(record: RareEventRecord) -> tuple[tuple[str, str], ...]:
 def _verdict_card(result: dict[str, Any]) -> Card:
     allowed = 1.0 - result["requirement"]["share"]
     source = f" Source: {of_source(result['requirement']['source'])}." if result["requirement"]["source"] else ""
-    answer, tone = _judged(result)
+    answer = standing(result)
     found = f"Probability of failure {number(result['probability'], 3)}, {_interval(result)}"
     if not result["probability"]:
         found = f"No case failed: probability of failure below {number(printed_interval(result)[1], 3)}"
-    return Card(result["requirement"]["name"], answer, f"{found}; allowed: {number(allowed, 3)}.{source}", tone)
+    sure = given_percent(result["requirement"]["confidence"])
+    detail = f"{found}; allowed: {number(allowed, 3)} with {sure} confidence.{source}"
+    return Card(result["requirement"]["name"], answer, detail, TONES[answer])
 
 
 def _cost_cards(result: dict[str, Any]) -> Iterator[Card]:

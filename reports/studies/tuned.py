@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mc_engine.studies.tuning_folder import TuningRecord
-from reports.text.numbers import axis_label, exact, number, percent, with_unit, words
+from reports.text.numbers import axis_label, exact, given_percent, number, with_unit, words
 
 
 class Tuned:
@@ -78,4 +78,4 @@ def metric_words(tuned: Tuned, measure: Mapping[str, Any]) -> str:
 
 
 def quantile_words(measure: Mapping[str, Any]) -> str:
-    return "" if measure["quantile"] is None else f" ({percent(measure['quantile'])} quantile)"
+    return "" if measure["quantile"] is None else f" ({given_percent(measure['quantile'])} quantile)"

@@ -7,6 +7,7 @@ from functools import partial
 from itertools import pairwise
 from math import ceil, floor, isfinite, log10
 
+from mc_engine.numbers_in_text import percent_digits
 from mc_engine.units import UNITS, unit_suffix
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
@@ -139,9 +140,14 @@ def percent(share: float | None, digits: int = 2, up: bool = False) -> str:
     return f"{_trim(f'{scaled:.{digits}f}')}{SPACE}%"
 
 
+def given_percent(share: float) -> str:
+    """A share that somebody gave, such as one that is required, in percent with all its digits: 99.996833 %."""
+    return f"{percent_digits(share)}{SPACE}%"
+
+
 def percentile(probability: float) -> str:
     """A percentile by its name: 99.865th percentile."""
-    text = percent(probability, 3).removesuffix(f"{SPACE}%")
+    text = percent_digits(probability)
     ending = {"1": "st", "2": "nd", "3": "rd"}.get(text[-1], "th") if text[-2:-1] != "1" else "th"
     return f"{text}{ending} percentile"
 

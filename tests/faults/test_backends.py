@@ -96,7 +96,7 @@ def test_missing_shards_are_named_with_the_commands_that_fly_them(campaign, tmp_
     text = str(caught.value)
     assert "cases 375 to 749, 950 to 1499 are missing" in text
     assert f"`mc-engine resume {tmp_path / '3'}`" in text
-    assert f"`mc-engine run {campaign.name} --cases 1500 --seed 1 --shard 2/4 --out DIR`" in text
+    assert f"`mc-engine run {tmp_path / '1'} --cases 1500 --seed 1 --shard 2/4 --out DIR`" in text
     assert "--shard 4/4" in text
     assert "--shard 1/4" not in text
     assert not (tmp_path / "merged").exists()

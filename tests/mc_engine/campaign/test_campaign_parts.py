@@ -64,6 +64,8 @@ MISTAKES = [
     (_with("control") + DISCRETE_CONTROL, "correlation 1.between",
      '"control" is a setting; only parameters can be correlated'),
     (_required('metric = "range_m"'), "requirement.r", "has no limit; give at_most, at_least or both"),
+    ('[requirement.completed]\nmetric = "range_m"\nat_most = 1', "requirement.completed",
+     "is what the share of completed cases is called; give it another name"),
     (_required('metric = "rang_m"\nat_most = 1'), "requirement.r.metric",
      '"rang_m" is not a metric of toy; did you mean "range_m"?'),
     (_required('metric = "range_m"\nat_most = 1\nat_least = 2'), "requirement.r.at_least", "2 is above at_most = 1"),

@@ -42,9 +42,18 @@ def test_a_faulty_file_is_refused_with_row_and_column(tmp_path):
         ("a\n1\nx\n", None, 'row 2, column "a": "x" is not a finite number'),
         ("a\n1\nnan\n", None, 'row 2, column "a": "nan" is not a finite number'),
         ('a\n"1\n', None, "is not CSV text"),
+        ("1,2\n3,4\n", None, '"m.csv" has numbers in its first line; put a line with the names of the columns first'),
+        ("1,2\n3,4\n", "1", "has numbers in its first line"),
+        ("1\n3\n", "1", "has numbers in its first line"),
     ]:
         with pytest.raises(FileFault, match=message):
             empirical_numbers(write(tmp_path, "m.csv", text), column)
+
+
+def test_a_name_in_a_parquet_file_is_none_of_its_numbers(tmp_path):
+    pandas.DataFrame({"7": [1.0, 3.0]}).to_parquet(tmp_path / "m.parquet")
+    for column in (None, "7"):
+        assert empirical_numbers(tmp_path / "m.parquet", column) == (1.0, 3.0)
 
 
 def test_files_that_are_not_what_they_say_are_refused(tmp_path):

@@ -193,6 +193,16 @@ def test_what_does_not_fit_is_said_with_its_place(folder):
         assert message in str(caught.value)
 
 
+def test_a_run_to_take_inputs_from_is_refused_where_the_campaign_takes_none(folder, tmp_path):
+    asked = ("run", folder / "first", "--from", folder / "runs" / "second", "--out", tmp_path / "new")
+    fails_with(2, call(*asked), "inputs: is missing; --from needs a section [inputs]")
+    assert not (tmp_path / "new").exists()
+    text = (folder / "second" / "campaign.toml").read_text().replace("from = ", "form = ")
+    with pytest.raises(CampaignError) as caught:  # where it is there with a mistake
+        load_campaign("x", text=text, directory=folder / "second", upstream=folder / "runs" / "first")
+    assert "is missing; --from" not in str(caught.value)
+
+
 # ---- where [inputs] may lead
 
 

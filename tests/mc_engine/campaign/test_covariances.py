@@ -151,6 +151,33 @@ def test_an_ephemeris_has_a_covariance_an_epoch():
         second.covariance_in("TNW")
 
 
+def test_a_covariance_without_a_frame_is_in_that_of_its_segment_whatever_frame_the_one_before_has():
+    epochs = ("1998-12-18T14:28:15", "1998-12-18T15:28:15", "1998-12-18T16:28:15")
+    head, one, two, three = oem(*epochs).split("EPOCH = ")
+    text = "EPOCH = ".join([head, one, two.replace("COV_REF_FRAME = RTN\n", ""), three])
+    assert [state.covariance_frame for state in read_message(text)] == ["RTN", "EME2000", "RTN"]
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_covariance_of_fewer_or_more_than_six_rows_is_refused_with_its_line(place):
+    text = oem("1998-12-18T14:28:15", "1998-12-18T15:28:15")
+    last = f"{TRIANGLE.split(chr(10))[6]}\n"
+    before, at, after = text.split(last)
+    for instead, message in [("", "has 5 of its six rows"), (2 * last, "a seventh row")]:
+        parts = (before, instead, at, last, after) if place == 0 else (before, last, at, instead, after)
+        with pytest.raises(MessageFault, match=f"line {17 + 10 * place}: .*{message}"):
+            read_message("".join(parts))
+    with pytest.raises(MessageFault, match="has 1 of its six rows"):
+        read_message(text.split(TRIANGLE)[0] + "1.0")  # which breaks off
+
+
+def test_a_keyword_that_an_opm_has_twice_is_refused_and_those_of_manoeuvres_are_not():
+    burn = "\nMAN_DURATION = 1\nCOMMENT a\nCOMMENT a"
+    assert np.array_equal(read_message(opm() + burn + burn)[0].covariance, MATRIX)
+    with pytest.raises(MessageFault, match="line 31: CX_X is there already, in line 10"):
+        read_message(opm() + "\nCX_X = 1")
+
+
 def test_a_mistake_in_the_campaign_file_is_named(folder):
     for before, after, message in [
         ('frame = "EME2000"', 'frame = "ITRF"', "axes ITRF cannot be had"),
@@ -221,7 +248,8 @@ def _check_oem(run: Path):
     fails_with(2, call("export", run, "--format", "oem", "--columns", columns), "--frame is missing")
     options = ["--format", "oem", "--frame", "EME2000", "--epoch", "2026-01-31T23:59:55"]
     fails_with(2, call("export", run, *options), "the six of x, y, z")
-    swapped = columns.replace("end_x_m,", "end_vx_m_s,", 1)
+    fails_with(2, call("export", run, *options, "--columns", f"{columns},end_x_m"), '"end_x_m" is there twice')
+    swapped = ",".join(f"end_{name}" for name in (*NAMES[3:], *NAMES[:3]))
     fails_with(2, call("export", run, *options, "--columns", swapped), "an OEM needs length there")
     fails_with(2, call("export", run, *options[:-1], "noon", "--columns", columns), '"noon" is no date')
     done = call("export", run, *options, "--columns", columns)
@@ -241,3 +269,7 @@ def _check_csv(run: Path):
     assert [float(row["end_x_m"]) for row in rows] == list(table["end_x_m"])
     fails_with(2, call("export", run, "--columns", "end_x_n"), 'did you mean "end_x_m"')
     fails_with(2, call("export", run, "--format", "xml"), "csv or oem")
+    for option, value in (("--epoch", "2026-01-31"), ("--frame", "EME2000"), ("--centre", "EARTH")):
+        fails_with(2, call("export", run, option, value), f"{option} is for --format oem")
+    fails_with(2, call("export", run, "--columns", ""), "--columns names no column")
+    fails_with(2, call("export", run, "--columns", "end_x_m,end_y_m,end_x_m"), '"end_x_m" is there twice')

@@ -121,7 +121,12 @@ MISTAKES_OF_AXES = [
     ("levels = 1\nhalf_range = 1", "levels", "1 is not allowed; it must be at least 2"),
     ("levels = 3\nvalues = [1]", "levels", "there are values already; give one of the two"),
     ("values = [true]", "values 1", "true is not a number; height_km is Height [km]"),
-]
+    *((f"values = [1, 2]\n{key} = 1", key, "belongs to levels = n; values already say it all")
+      for key in ("mean", "half_range", "three_sigma", "lower", "upper")),
+    *((f'dist = "constant"\nvalue = 1\n{line}', line.split()[0],
+       "belongs to an axis of several levels; a constant has one, its value")
+      for line in ("levels = 3", "values = [2, 3]")),
+]  # fmt: skip
 
 
 def test_a_wrong_dispersion_is_refused_with_the_reason():

@@ -61,6 +61,20 @@ def test_a_run_that_is_complete_is_not_flown_again(here):
     assert not (here / "flown" / "report.html").exists()
 
 
+def test_a_complete_run_that_cannot_be_extended_is_not_said_to_be(here):
+    small_store(here / "latin", design="lhs").note("finished")
+    answer = call("resume", "latin").stdout
+    assert answer == "latin: is complete; `mc-engine report latin` writes the reports anew\n"
+
+
+def test_a_complete_shard_is_to_be_merged(here):
+    flight = ("run", "minimal", "--cases", "20", "--no-report", "--shard")
+    assert call(*flight, "1/2", "--out", "part").exit_code == 0
+    answer = call("resume", "part").stdout
+    assert answer.startswith("part: is complete; `mc-engine merge RUN SHARD...` makes one run")
+    assert "extend" not in answer
+
+
 def test_a_creation_that_the_disk_cut_short_is_begun_again_by_the_same_command(here, monkeypatch):
     durably = store.disk.write_inside
 
@@ -102,6 +116,22 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows' shells quot
 def commands_in(text):
     """The words of all commands that a text names, as a shell takes them."""
     return [shlex.split(command)[1:] for command in re.findall("`(mc-engine [^`]*)`", text)]
+
+
+@posix
+@pytest.mark.parametrize("name", ["r s/1", "deorbit"])
+def test_the_command_that_flies_a_missing_shard_can_be_given_as_it_stands(here, name):
+    shutil.copytree(SHIPPED / "minimal", here / "mine")
+    flight = ("run", "mine", "--cases", "30", "--no-report")
+    assert call(*flight, "--shard", "1/2", "--out", name).exit_code == 0
+    shutil.rmtree(here / "mine")
+    refused = call("merge", "whole", name)
+    [command] = commands_in(refused.stderr)
+    assert command[1] == {"deorbit": "./deorbit"}.get(name, name)
+    assert call(*[{"DIR": "other"}.get(word, word) for word in command]).exit_code == 0
+    merged = call("merge", "whole", name, "other", "--no-report")
+    assert merged.exit_code == 0, merged.output
+    assert open_store("whole").n_cases == 30
 
 
 @posix

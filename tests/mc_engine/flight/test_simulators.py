@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -222,6 +223,35 @@ def test_words_and_numbers_of_imported_results_are_checked(tmp_path, flown):
     assert store.status_counts() == {"ok": 99, "crashed": 1}
     others = table.index != 7
     assert store.cases()["fall_time_s"][others].equals(flown["case"].cases()["fall_time_s"][others])
+
+
+def with_nominal(flown, tmp_path, **changes):
+    """The run that is imported from the table with its nominal case, which is changed."""
+    store = flown["case"]
+    row = {name: value for name, value in store.nominal().items() if name in store.cases()}
+    table = pd.concat([store.cases(), pd.DataFrame([{**row, "case_id": -1, **changes}])])
+    table.to_csv(tmp_path / "results.csv", index=False)
+    return import_results(load_campaign(python_campaign(tmp_path / "ball")), tmp_path / "results.csv", tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("changes", "status", "reason"),
+    [
+        ({}, "ok", ""),
+        ({"status": "no-stop", "reason": "too long"}, "no-stop", "too long"),
+        ({"fall_time_s": np.nan}, "not-finite", '"fall_time_s" is no finite number in the imported table'),
+    ],
+)
+def test_an_imported_nominal_case_is_judged_like_the_others(tmp_path, flown, changes, status, reason):
+    row = with_nominal(flown, tmp_path, **changes).nominal()
+    assert (row["status"], row["reason"]) == (status, reason)
+    assert np.isfinite(row["fall_time_s"]) == (status == "ok")
+    assert row["mass_kg"] == flown["case"].nominal()["mass_kg"]
+
+
+def test_an_imported_nominal_case_of_other_inputs_is_refused(tmp_path, flown):
+    with pytest.raises(CampaignError, match=r"mass_kg: case -1 has 99, and the nominal value of the campaign is "):
+        with_nominal(flown, tmp_path, mass_kg=99.0)
 
 
 def test_the_histories_of_a_batch_simulator_are_shared_out_among_the_workers(tmp_path, monkeypatch):

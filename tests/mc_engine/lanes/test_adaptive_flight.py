@@ -167,3 +167,22 @@ def test_a_case_that_needs_more_attempts_than_allowed_ends_as_step_limit(wave):
     got = flown(replace(wave, clock=clock), stop_s=np.array([1.0, 99.0]))
     assert list(got["status"]) == ["ok", "step-limit"]
     assert 0.0 < got["end_time_s"][1] < 99.0
+
+
+def test_a_falling_crossing_is_met_in_a_step_that_also_rises_over_the_level_and_reaches_the_ground():
+    """Closed form of a hop with constant accelerations, whose coast is one long step."""
+    burn = np.linspace(4.8, 7.2, 50)
+    columns = flown(load_model("moon_hop.py", FOLDER), burn_s=burn)
+    up = 5.0 - 1.62
+    speed, height = up * burn, 0.5 * up * burn**2
+    down = [burn + (speed + np.sqrt(speed**2 + 3.24 * (height - level))) / 1.62 for level in (100.0, 0.0)]
+    assert set(columns["status"]) == {"ok"}
+    for name, times in zip(("legs_s", "last_s", "land_s"), (down[0], down[0], down[1]), strict=True):
+        assert columns[name] == pytest.approx(times, abs=1e-8)
+
+
+def test_the_time_of_a_largest_value_that_jumps_there_is_that_of_the_jump():
+    opening = np.linspace(4.0, 6.0, 20)
+    columns = flown(load_model("opened_parachute.py", FOLDER), open_s=opening)
+    assert columns["top_s"] == pytest.approx(opening, abs=1e-9)
+    assert (columns["top_m_s2"] > 500.0).all()

@@ -42,6 +42,12 @@ MISTAKES = {
     "value of no output": (('maximum_of("speed_m_s"', 'value_at("apogee", "sped_m_s"'),
                            'metric "top_speed_m_s": there is no output "sped_m_s"; did you mean "speed_m_s"?'),
     "time in metres": (('maximum_of("speed_m_s", ', 'time_of("apogee", '), 'is in "m/s", but it holds a value in "s"'),
+    "a field that the engine keeps": (
+        ("MODEL =", 'from collections import namedtuple\n\n'
+                    'Memory = namedtuple("Memory", "speed_at_far", defaults=(0.0,))\nMODEL ='),
+        ("observe=observe", "observe=observe, memory=Memory"),
+        ('maximum_of("speed_m_s", ', 'value_at("far", "speed_m_s", '),
+        'the field "speed_at_far" is there twice'),
     "nearly since": (("def observe(s)", "def observe(s, sinc)"), 'takes "sinc"; did you mean "since"?'),
     "control without memory": (("Phase(rhs, events={\"far\"", "Phase(rhs, rhs, events={\"far\""),
                                "name its class, memory=Memory"),
@@ -103,3 +109,11 @@ def test_check_has_nothing_to_say_of_a_right_model_in_phases(tmp_path):
     campaign = campaign_with(tmp_path, *PHASES)
     assert breaches(campaign) == []
     assert faults(campaign) == []
+
+
+def test_a_phase_needs_no_events(tmp_path):
+    """One event function in all, and a last phase that looks for nothing."""
+    last = ('"away": Phase(rhs, events={"apogee": Event(climb, "falling", "stop")})', '"away": Phase(rhs)')
+    campaign = campaign_with(tmp_path, *PHASES, last)
+    assert [event.name for event in campaign.model.event_list] == ["far"]
+    assert not [fault for fault in faults(campaign) if "IndexError" in fault]

@@ -19,6 +19,9 @@ INPUTS = "".join(
 )
 
 
+GROUPED = "[sensitivity]\ncases = 64\n[sensitivity.group]\n"
+
+
 def campaign(folder, more="", head=HEAD):
     shutil.copy(MODEL, folder)
     (folder / "campaign.toml").write_text(head + INPUTS + more)
@@ -119,6 +122,14 @@ def test_flights_broken_off_are_resumed_to_the_same_bytes(tmp_path):
         ("[sensitivity]\ncases = 64\n[sensitivity.group]\na = ['x9']\n", '"x9" is not dispersed; known are "x1"'),
         ("[sensitivity]\ncases = 64\n[sensitivity.group]\na = ['ticket']\n", "names a random draw"),
         ("[sensitivity]\ncases = 64\n[sensitivity.group]\na = ['x1']\nb = ['x1']\n", 'is in the group "a" already'),
+        (GROUPED + "x3 = ['x1', 'x2']\n", "sensitivity.group.x3: is the name of a dispersion outside the group"),
+        (GROUPED + "ticket = ['x1']\n", "is the name of a dispersion outside the group"),
+        (GROUPED + "'random draws' = ['x1']\n", "sensitivity.group.random draws: is what the engine calls a group"),
+        (GROUPED + "'cases of a' = ['x1']\n", "is what the engine calls a group of its own"),
+        (GROUPED + "' a' = ['x1']\n", "begins or ends with a blank"),
+        (GROUPED + '"a\\nb" = ["x1"]\n', "is no name; use letters"),
+        (GROUPED + "a = []\n", "sensitivity.group.a: has no members"),
+        (GROUPED + "x1 = ['x1', 'x2']\nb = ['x1']\n", '"x1" is in the group "x1" already'),
         ("[sensitivity]\ncases = 10000000\n", None),
     ],
 )

@@ -129,7 +129,12 @@ def test_the_number_accepted_is_where_the_verdict_turns():
     ],
 )
 def test_a_run_was_looked_at_when_it_flew_by_looks_or_was_extended(manifest, n_cases, looked):
-    assert was_looked_at(manifest, n_cases) is looked
+    assert was_looked_at(manifest, n_cases) is was_looked_at(manifest, n_cases, n_cases) is looked
+    assert was_looked_at(manifest, n_cases, n_cases - 1)  # interrupted
+
+
+def test_a_shard_has_fewer_cases_as_it_was_to_have():
+    assert not was_looked_at({"campaign": {"cases": 100}, "shard": {"number": 1, "of": 2}}, 100, 50)
 
 
 SPEED = {**FUEL, "name": "speed", "metric": "speed_m_s", "at_most": None, "at_least": 5.0, "confidence": 0.95}

@@ -1,6 +1,7 @@
 """What `bench` times is the flight of `run`, and it says how fast in words that compare."""
 
 import re
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +11,11 @@ from typer.testing import CliRunner
 from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.columns import END_TIME
 from mc_engine.campaign.loading import load_campaign
+from mc_engine.campaign.search import SHIPPED
 from mc_engine.command_line.commands import app
 from mc_engine.flight.flight import bound_flight, fly
 from mc_engine.model import AdaptiveStep, FixedStep
-from mc_engine.studies.lane_speed import MethodTiming, _first_within, _Trials, compare_methods
+from mc_engine.studies.lane_speed import MethodTiming, Timing, _first_within, _Trials, compare_methods
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +32,24 @@ def test_the_timed_kernel_flies_the_cases_of_a_run(minimal, width):
     assert ends.size % width == 0
     wanted = fly(minimal.model, inputs, ids, minimal.seed, folder=minimal.directory)[END_TIME]
     np.testing.assert_array_equal(ends, np.resize(wanted, ends.size))
+
+
+def test_as_many_cases_are_timed_as_asked_for_where_the_design_has_them(monkeypatch, tmp_path):
+    flown = []
+
+    def timed(flight, widths, repeats):
+        flown.append(flight.n_cases)
+        return Timing()
+
+    monkeypatch.setattr("mc_engine.studies.lane_speed.measure", timed)
+    text = (SHIPPED / "minimal" / "campaign.toml").read_text()
+    shutil.copytree(SHIPPED / "minimal", tmp_path / "few")
+    for design, said in (("mc", ""), ("lhs", "--cases 40: few has 20 cases by its design; all fly\n")):
+        few = re.sub(r"cases = \d+", "cases = 20", re.sub(r"(?m)^design = .*", f'design = "{design}"', text), count=1)
+        (tmp_path / "few" / "campaign.toml").write_text(few)
+        done = CliRunner().invoke(app, ["bench", str(tmp_path / "few"), "--cases", "40"])
+        assert (done.exit_code, done.stderr) == (0, said), done.output
+    assert flown == [40, 20]
 
 
 def test_bench_prints_cases_a_second_nanoseconds_a_step_and_the_ratio():

@@ -83,6 +83,14 @@ def test_a_requirement_that_stands_worse_on_the_same_cases_is_a_change(tmp_path)
     assert not better.changed
 
 
+def test_fewer_cases_of_the_same_code_are_no_worse_verdict(tmp_path):
+    found = compared(run(tmp_path / "a", n=200), run(tmp_path / "b", n=21))
+    (fuel,) = found.verdicts
+    assert fuel.inside == ((21, 21), (21, 21))
+    assert fuel.words == "not demonstrable in both runs"
+    assert not found.changed
+
+
 @pytest.mark.parametrize("requirement_of", ["A", "B"])
 def test_the_only_requirement_of_a_run_is_its_joint_verdict(tmp_path, requirement_of):
     one, two = (REQUIREMENT | {"name": name, "metric": metric, "at_most": limit, "share": 0.9}

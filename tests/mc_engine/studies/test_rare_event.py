@@ -21,7 +21,7 @@ from mc_engine.sampling.distributions import Discrete, Empirical, Normal
 from mc_engine.section import ReportSection
 from mc_engine.studies.limit_state import LimitState, chosen_requirement
 from mc_engine.studies.rare_event import estimate_rare_event
-from mc_engine.studies.rare_event_folder import open_rare_event, rare_event_lines
+from mc_engine.studies.rare_event_folder import open_rare_event, probability_words, rare_event_lines
 
 MINIMAL = SHIPPED / "minimal"
 
@@ -104,6 +104,15 @@ def test_the_interval_holds_with_the_confidence_of_the_campaigns_report(estimate
     other = estimate_rare_event(surer, out=tmp_path / "out", workers=1).result
     assert other["probability"] == estimate.result["probability"]
     assert other["lower"] < estimate.result["lower"] < estimate.result["upper"] < other["upper"]
+
+
+def test_the_upper_end_holds_with_the_confidence_that_the_requirement_asks_for(estimate, tmp_path):
+    (requirement,) = minimal().requirements
+    surer = replace(minimal(), requirements=(replace(requirement, confidence=0.999),))
+    result = estimate_rare_event(surer, out=tmp_path / "out", workers=1).result
+    assert result["confidence"] == 0.998  # an upper end of the interval alone then holds with 0.999
+    assert result["upper"] > estimate.result["upper"]
+    assert "with 99.9 % confidence, so it is" in probability_words(result)
 
 
 def test_inputs_have_the_distributions_and_correlations_of_the_campaign():

@@ -16,6 +16,8 @@ from reports.cli import write_reports
 from reports.contents import build
 from reports.run import all_cases
 from reports.run.flown import Flown
+from reports.sections.diagnostics import normal_probability_blocks
+from reports.sections.tables import range_table
 
 CASES, PART, FEW_CASES = 100_000, 7919, 4000
 BUDGET, SMALL_BUDGET = 1 << 16, 1 << 13  # cells
@@ -159,6 +161,23 @@ def tables(document, caption):
     return [
         block for one in document.sections for block in one.blocks if getattr(block, "caption", "").startswith(caption)
     ]
+
+
+def test_the_ranges_of_a_sample_of_a_grid_are_those_of_all_cases(small, monkeypatch):
+    monkeypatch.setitem(small.manifest["campaign"], "design", "grid")
+    monkeypatch.setattr(all_cases, "MOST_CELLS", SMALL_BUDGET)
+    sampled = Flown(small, "run")
+    ends = [[cell.value for cell in row[-2:]] for row in range_table(sampled).rows]
+    assert ends == [[one.minimum, one.maximum] for one in sampled.summaries.values()]
+    held = np.nanmax(sampled.values("propellant_kg"))
+    assert held < sampled.summaries["propellant_kg"].maximum  # the sample has not the largest
+
+
+def test_the_shape_of_a_sample_with_failed_cases_is_a_number(small, monkeypatch):
+    monkeypatch.setattr(all_cases, "MOST_CELLS", SMALL_BUDGET)
+    sampled = Flown(small, "run")
+    (block,) = normal_probability_blocks(sampled)
+    assert not any("not a number" in plot.title for plot in block.drawing.plots)
 
 
 def test_a_streamed_run_has_all_its_reports(small, monkeypatch):

@@ -70,6 +70,16 @@ def test_a_run_extended_by_hand_says_so():
     assert "extended" not in " ".join(warnings(flown(campaign=mc())))
 
 
+def test_an_interrupted_run_has_the_bounds_that_hold_at_every_number_of_cases():
+    run = synthetic_run(1000, 0, requirements=[FUEL], campaign=mc(2000))
+    run.wanted = 2000
+    cut = Flown(run, "run")
+    assert cut.verdicts[0].looked
+    assert "Robbins" in requirement_table(cut).note
+    warned = " ".join(warnings(cut)).replace("\u202f", " ")
+    assert "interrupted after 1 000 of 2 000 cases. The bounds on probabilities hold at every number" in warned
+
+
 def test_a_nominal_case_that_failed_is_told():
     run = synthetic_run(500, failed=0)
     assert "nominal case failed" not in " ".join(warnings(Flown(run, "run")))
@@ -96,6 +106,20 @@ def test_a_key_result_is_what_the_matrix_says_is_demonstrated(lowest):
     card = next(card for card in cost_cards(band) if card.label == "propellant")
     told = card.answer if lowest is None else card.detail
     assert f"{demonstrated} in 99.73\u202f% of cases, 90\u202f% confidence" in told
+
+
+def test_a_key_result_is_of_the_requirement_whose_limit_it_shows():
+    loose = {**FUEL, "name": "loose", "at_most": 4.0, "share": 0.5}
+    flight = flown(2000, campaign=mc(2000), requirements=[loose, FUEL])
+    card = next(card for card in cost_cards(flight) if card.label == "propellant")
+    assert f"{requirement_table(flight).rows[1][2].text} in 99.73\u202f% of cases" in card.answer
+    assert card.answer.endswith("limit 2.5\u202fkg")
+
+
+def test_a_required_share_is_printed_with_the_digits_that_it_was_given():
+    flight = flown(requirements=[{**FUEL, "share": 0.99996833}])
+    assert "for 99.996833 % with 90 % confidence" in texts(requirement_table(flight))[0][1]
+    assert "99.996833\u202f% of cases" in verdict_cards(flight)[0].detail
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 40])

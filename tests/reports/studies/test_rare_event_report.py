@@ -67,7 +67,7 @@ def test_the_headline_is_the_probability_against_what_is_allowed(tmp_path):
     assert document.subtitle == f"P(fuel > 2.5\u202fkg) = 2·10⁻⁵ ({interval}). Requirement met."
     (card,) = document.verdicts
     assert (card.answer, card.tone) == ("met", "good")
-    assert f"{interval}; allowed: 0.0027. Source: tank." in card.detail
+    assert f"{interval}; allowed: 0.0027 with 90\u202f% confidence. Source: tank." in card.detail
     assert document.costs[1].detail.startswith("Plain Monte Carlo needs 2\u202f960\u202f000 for the same")
 
 
@@ -114,7 +114,7 @@ def test_without_a_failed_case_the_report_says_below(tmp_path):
     assert document.subtitle == "No case failed: P(fuel > 2.5\u202fkg) < 0.0003. Requirement met."
     assert document.warnings == ("The probability is smaller than 1.2·10⁻¹⁴.",)
     assert document.verdicts[0].detail.startswith(
-        "No case failed: probability of failure below 0.0003; allowed: 0.0027."
+        "No case failed: probability of failure below 0.0003; allowed: 0.0027 with 90\u202f% confidence."
     )
     assert document.costs == ()  # there is no standard error of nothing
     assert "add up" not in repr(document.sections[0])

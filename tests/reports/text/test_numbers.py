@@ -11,11 +11,13 @@ from reports.text.numbers import (
     count,
     exact,
     fixed,
+    given_percent,
     interval,
     limit_number,
     named,
     number,
     percent,
+    percentile,
     spelled,
     typeset,
     with_unit,
@@ -84,6 +86,18 @@ def test_a_share_is_never_rounded_up(share, text):
 )
 def test_an_upper_bound_is_never_rounded_down(share, text):
     assert percent(share, up=True) == f"{text}\u202f%"
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (0.99996833, "99.996833"), (0.9, "90"), (0.99865, "99.865"), (0.9973, "99.73"), (0.00135, "0.135"),
+        (2.0 * 0.95 - 1.0, "90"), (1e-12, "0.0000000001"), (0.999999999999, "99.9999999999"),
+    ],
+)  # fmt: skip
+def test_a_share_that_was_given_has_all_its_digits(share, text):
+    assert given_percent(share) == f"{text}\u202f%"
+    assert percentile(share).startswith(f"{text}")
 
 
 def test_a_count_is_grouped_in_threes():
