@@ -118,46 +118,6 @@ def later_fall(when, x, t, h, mask):
 
 
 @physics
-def jump(before, after, mask):
-    """1 where the mask holds and an output is not the same on both sides of an instant, else 0."""
-    return where(mask & (before != after), 1.0, 0.0)
-
-
-@physics
-def no_jump(value):
-    return where(value == value, 0.0, 0.0)
-
-
-@physics
-def without_jump(smooth, jumps):
-    return where(jumps > 0.5, 0.0, smooth)
-
-
-@physics
-def left_value(best, value, jumps):
-    """Best value so far, that before a jump included."""
-    return where((jumps > 0.5) & ((value > best) | (value != value)), value, best)
-
-
-@physics
-def left_time(when, best, value, jumps, t):
-    """Time of the best value, that before a jump at t included."""
-    return where((jumps > 0.5) & (value != value), value, where((jumps > 0.5) & (value > best), t, when))
-
-
-@physics
-def left_last(when, v0, v1, t0, t1, jumps):
-    """Last time above zero, up to the value v1 before a jump at t1."""
-    return fall_time(above(when, v1, t1, jumps > 0.5), v0, v1, t0, t1, jumps > 0.5)
-
-
-@physics
-def restarted(value, after, jumps):
-    """The look before, which behind a jump is the one there."""
-    return where(jumps > 0.5, after, value)
-
-
-@physics
 def end_value(best, value, mask):
     """Best value, an end point of the flight included where the mask holds."""
     return where(mask & ((value > best) | (value != value)), value, best)

@@ -14,7 +14,7 @@ from mc_engine.lanes import extrema
 from mc_engine.lanes.aligned_stack import align_stack
 from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.events import follow, may_have_crossed
-from mc_engine.lanes.functions import any_lane, fma, maximum, where
+from mc_engine.lanes.functions import any_lane, fma, where
 from mc_engine.lanes.history import look_shared, record_row
 from mc_engine.lanes.lane_access import unequal
 from mc_engine.lanes.philox import Draws
@@ -40,9 +40,8 @@ from mc_engine.status import EVENT_LIMIT, NO_STOP, NOT_FINITE
 # restart(past, lanes) : past without the earlier steps of some lanes, whose discrete state has changed
 # advance(f, tables, past, t, finish, h, s, m, p, o, flying) : (state at the end of a grid step, past)
 # single(f, tables, t, h, s, m, p, o) : state after a step of length h [s], lanes, from a state alone
-# track(past, number, closing, lanes, h, smooth, jumps, seen, times, lasts, best, when, last) : running extrema and past
-# after one more look at the outputs, the `number`th of the flight, the newest of `seen`; closing : it is the last of
-# `lanes`; jumps : 1 where an output jumped at one of the two newest looks, between which no curve is laid then
+# track(past, number, closing, lanes, h, smooth, seen, times, lasts, best, when, last) : running extrema and past after
+# one more look at the outputs, the `number`th of the flight, the newest of `seen`; closing : it is the last of `lanes`
 Method = namedtuple("Method", "begin restart advance single track tables")
 MOST_SLOPES = 11
 # What a multistep method keeps of the tracked outputs at the last grid points, the latest of number n in place
@@ -107,30 +106,11 @@ def _track_by_three(lanes, chords, smooth, seen, times, lasts, best, when, last)
 track_by_three = compile_inline(_track_by_three)
 
 
-def _track(past, number, closing, lanes, h, smooth, jumps, seen, times, lasts, best, when, last):
-    smooth = map_fields(extrema.without_jump, smooth, jumps)
+def _track(past, number, closing, lanes, h, smooth, seen, times, lasts, best, when, last):
     return *track_by_three(lanes, lanes, smooth, seen, times, lasts, best, when, last), past
 
 
 track = compile_inline(_track)
-
-
-def _left(f, t, s, m, p, o, held, lanes, times, w1, best, when, last):
-    """(running extrema, the look before, jumps) after the outputs that a sample of the control ends; held : by it.
-
-    An output that jumps had its value before the jump until then, and is no line from there to the look before.
-    """
-    before, after = spread(f.observe(t, s, m, p, o), t), spread(f.observe(t, s, held, p, o), t)
-    v, w, w2 = f.peaks_of(before), f.lasts_of(before), f.lasts_of(after)
-    jumps = map_fields(extrema.jump, v, f.peaks_of(after), lanes)
-    when = map_fields(extrema.left_time, when, best, v, jumps, t)
-    best = map_fields(extrema.left_value, best, v, jumps)
-    fell = map_fields(extrema.jump, w, w2, lanes)
-    last = map_fields(extrema.left_last, last, w1, w, times[1], t, fell)
-    return best, when, last, map_fields(extrema.restarted, w1, w2, fell), jumps
-
-
-left = compile_inline(_left)
 
 
 def _looks_from(v, w, t):
@@ -186,7 +166,6 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
     w1 = f.lasts_of(seen)
     when, last = map_fields(extrema.first_time, v1, t), map_fields(extrema.first_time, w1, t)
     t0 = t1 = t2 = t
-    jump1 = jump2 = map_fields(extrema.no_jump, v1)  # of the outputs at v1 and v2
     past = method.begin(method.tables, stage_memory(s, MOST_SLOPES), looks_from(v1, w1, t), s, t)
     last_memory = m
     for k in range(n_steps):
@@ -196,15 +175,11 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
                 record_row(f, history, rows, flying, t2, s, m, p, o)
             held = spread(f.control(t2, s, m, p, o, Draws(key, case, float(k // control_every))), t)
             past = method.restart(past, unequal(m, held, t))
-            best, when, last, w1, jump2 = left(f, t2, s, m, p, o, held, flying, (t0, t1), w1, best, when, last)
             m = held  # of lanes that have ended, too: what they held then is in `last_memory`
         seen = spread(f.observe(t2, s, m, p, o), t)
         v2, w2 = f.peaks_of(seen), f.lasts_of(seen)
         smooth, values, times, lasts = f.smooth_of(v2), (v0, v1, v2), (t0, t1, t2), (w1, w2)
-        jumps = map_fields(maximum, jump1, jump2)
-        best, when, last, past = method.track(
-            past, k, False, flying, h, smooth, jumps, values, times, lasts, best, when, last
-        )
+        best, when, last, past = method.track(past, k, False, flying, h, smooth, values, times, lasts, best, when, last)
         if recorded:  # looked at anew: so the outputs that only a history wants cost nothing where there is none
             record_row(f, history, rows, flying, t2, s, m, p, o)
         # the grid's own time, not a sum of steps: no rounding piles up, and a sample falls where it belongs
@@ -226,7 +201,7 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
             v3, w3 = f.peaks_of(seen), f.lasts_of(seen)
             values, times, lasts = (v1, v2, v3), (t1, t2, t), (w2, w3)
             best, when, last, _ = method.track(
-                past, k + 1, True, at_end, h, smooth, jump2, values, times, lasts, best, when, last
+                past, k + 1, True, at_end, h, smooth, values, times, lasts, best, when, last
             )
             when = map_fields(extrema.end_time, when, best, v3, t, at_end, t)
             best = map_fields(extrema.end_value, best, v3, at_end)
@@ -235,7 +210,6 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
         if not any_lane(flying):
             break
         v0, v1, w1, t0, t1, t2 = v1, v2, w2, t1, t2, finish
-        jump1, jump2 = jump2, map_fields(extrema.no_jump, v1)
     return t, s, last_memory, status, flying, best, when, last
 
 

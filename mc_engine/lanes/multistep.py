@@ -298,7 +298,7 @@ def _search(looks, number, t, h, count, closing, lanes, smooth, best, when, last
 search = compile_callable(_search)
 
 
-def _track_by_all(looks, number, closing, lanes, count, h, smooth, jumps, seen, times, lasts, best, when, last):
+def _track_by_all(looks, number, closing, lanes, count, h, smooth, seen, times, lasts, best, when, last):
     """Running extrema after a look that may change them, or that belongs to a motion of few looks.
 
     count : how many looks the motion has had, this one included
@@ -310,7 +310,6 @@ def _track_by_all(looks, number, closing, lanes, count, h, smooth, jumps, seen, 
     put_stage(looks.lasts, number % LOOKS, lasts[1])
     # around the end of a motion three looks have to do
     corner, v0, v1, v2 = map_fields(_at_corner, smooth, count < 3.0), seen[0], seen[1], seen[2]
-    corner = map_fields(extrema.without_jump, corner, jumps)
     best, when, last = track_by_three(lanes, lanes & (count < 2.0), corner, seen, times, lasts, best, when, last)
     crests = any_field(map_fields(_smooth_crest, v0, v1, v2, best, smooth))
     falls = any_field(map_fields(extrema.falls, lasts[0], lasts[1], lanes))
@@ -326,7 +325,7 @@ def _track_by_all(looks, number, closing, lanes, count, h, smooth, jumps, seen, 
 track_by_all = compile_callable(_track_by_all)
 
 
-def _track(past, number, closing, lanes, h, smooth, jumps, seen, times, lasts, best, when, last):
+def _track(past, number, closing, lanes, h, smooth, seen, times, lasts, best, when, last):
     """Running extrema and past after one more look, see `Method`; it is of the motion that its slope will be of."""
     looks, count, v0, v1, v2 = past.looks, past.known + 1.0, seen[0], seen[1], seen[2]
     crests = lanes & any_field(map_fields(extrema.crest, v0, v1, v2, best))
@@ -337,7 +336,7 @@ def _track(past, number, closing, lanes, h, smooth, jumps, seen, times, lasts, b
     falls = any_field(map_fields(extrema.falls, lasts[0], lasts[1], lanes))
     if closing or any_lane(lanes & (smooth_crests | falls | (count <= float(LOOKS)))):
         best, when, last = track_by_all(
-            looks, number, closing, lanes, count, h, smooth, jumps, seen, times, lasts, best, when, last
+            looks, number, closing, lanes, count, h, smooth, seen, times, lasts, best, when, last
         )
     else:
         put_stage(looks.peaks, number % LOOKS, v2)

@@ -1,14 +1,11 @@
 """Running extrema along a flight against closed forms."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from flown_models import FOLDER, OSCILLATOR, flown, inputs_of, same_bytes
+from flown_models import FOLDER, OSCILLATOR, flown, inputs_of
 
 from mc_engine.flight.flight import fly_history
 from mc_engine.lanes.extrema import crest, crest_time, crest_value
-from mc_engine.model import load_model
 
 RANDOM = np.random.default_rng(5)
 AMPLITUDE, PHASE, RATE = RANDOM.uniform(0.5, 2.0, 60), RANDOM.uniform(0.2, 6.0, 60), RANDOM.uniform(0.3, 2.0, 60)
@@ -83,20 +80,3 @@ def test_the_crest_of_three_points_of_a_parabola_is_exact_however_short_the_last
     assert crest_value(0.0, 0.0, *values, *times, 1.0, True) == pytest.approx(5.0, rel=1e-15)
     found = crest_time(0.0, 0.0, *values, *times, 1.0, True)
     assert found == pytest.approx(1.0 + 0.25 * last_step, abs=max(1e-7 * last_step, 1e-15 / last_step))
-
-
-@pytest.mark.parametrize("method", ["rk4", "abm8"])
-def test_extremes_of_what_jumps_at_samples_are_values_that_it_had(method):
-    written = load_model("bang_bang.py", FOLDER)
-    bang = replace(written, clock=replace(written.clock, method=method))
-    push = np.linspace(0.7, 1.3, 24)
-    columns = flown(bang, push_m_s2=push)
-    same_bytes(flown(bang, 1, push_m_s2=push), columns)
-    np.testing.assert_array_equal(columns["top_m_s2"], push)
-    np.testing.assert_array_equal(columns["low_m_s2"], -push)
-    for case in range(0, 24, 6):
-        history = fly_history(bang, inputs_of(bang, {"push_m_s2": push[case]}), 0, 1, folder=FOLDER)[1]
-        assert columns["moved_m"][case] == history["moved_m"].max()  # both sides of each sample are rows
-        positive = history["t_s"][history["push_m_s2"] > 0.5]
-        assert columns["last_s"][case] == pytest.approx(positive[-1], abs=1e-9)
-        assert columns["top_s"][case] == pytest.approx(positive[0], abs=1e-9)
