@@ -34,7 +34,7 @@ from mc_engine.sampling.distributions import Scalar
 from mc_engine.sampling.sobol import MAX_DIMENSIONS
 from mc_engine.suggestions import hint, listed
 
-COMPLETED = "completed"  # stands beside the names of requirements in a comparison
+COMPLETED = "completed"  # name of the share of completed cases, which a comparison tests along with each requirement
 _LARGEST_HYPERCUBE = 10_000_000  # cases; a Latin hypercube is held in memory as a whole
 _CASES_PER_CORRELATED = 10  # a Latin hypercube with fewer may not have room for the correlations asked for
 

@@ -124,7 +124,7 @@ def interval_of_mean(estimates: np.ndarray, confidence: float) -> tuple[float, f
 
     Estimates by subset simulation are products and nearly log-normal: Cox's interval on the mean of a log-normal, with
     Student's t for the few runs, and ALLOWANCE.  With a run at zero it is Student's interval on the mean itself, cut
-    at zero; its upper end is at least that of the runs above zero alone, since those at zero hide how far they scatter.
+    at zero; its upper end is at least the largest estimate, since runs at zero hide how far the estimates scatter.
     Olsson, Journal of Statistics Education 13 (2005), no. 1, eq. (modified Cox).
     """
     n = estimates.size
@@ -132,9 +132,7 @@ def interval_of_mean(estimates: np.ndarray, confidence: float) -> tuple[float, f
     mean = float(estimates.mean())
     if estimates.min() <= 0.0:
         reach = quantile * float(estimates.std(ddof=1)) / math.sqrt(n)
-        found = estimates[estimates > 0.0]
-        above = interval_of_mean(found, confidence)[1] if found.size > 1 else float(estimates.max())
-        return max(0.0, mean - reach), max(mean + reach, above)
+        return max(0.0, mean - reach), max(mean + reach, float(estimates.max()))
     logs = np.log(estimates)
     variance = float(logs.var(ddof=1))
     centre = float(logs.mean()) + 0.5 * variance

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from mc_engine.campaign.parts import COMPLETED
 from mc_engine.errors import EngineError
 from mc_engine.section import ReportSection
 from mc_engine.statistics.change_tests import MetricChange, ShareChange, holm, metric_change, share_change
@@ -33,7 +34,6 @@ from mc_engine.studies.run_changes import Difference, campaign_diff, campaign_di
 
 ALPHA = 0.003  # one false alarm in some 300 comparisons; 0.3 sigma is still found with 1000 cases and dozens of metrics
 TOLERANCE = 1e-6  # standard deviations: smaller differences of a pair are rounding
-FLOWN = "completed"  # refused as the name of a requirement
 _RANK = {PASS: 0, NOT_DEMONSTRABLE: 1, FAIL: 2}
 
 
@@ -164,7 +164,7 @@ def compare_runs(
                       confidence=confidence, tolerance=tolerance)
         for name in metrics
     ]  # fmt: skip
-    counted = {FLOWN: ok, **_cases_inside(manifests[1], values, ok)}
+    counted = {COMPLETED: ok, **_cases_inside(manifests[1], values, ok)}
     shares = [
         share_change(name, before[first], other[second], paired=pairing.paired, confidence=confidence)
         for name, (before, other) in counted.items()
