@@ -10,7 +10,7 @@ M. Dowell, P. Jarratt, "A modified regula falsi method", BIT 11 (1971) 168-174.
 """
 
 from mc_engine.lanes.compiler import compile_inline
-from mc_engine.lanes.functions import any_lane, minimum, where
+from mc_engine.lanes.functions import any_lane, maximum, minimum, where
 from mc_engine.lanes.history import record_change, record_row
 from mc_engine.lanes.physics_function import physics
 from mc_engine.lanes.tuples import any_field, least, map_fields, select, spread
@@ -71,10 +71,11 @@ def _locate(f, method, signs, t, finish, s, m, p, o, length, end, g_start, g_end
             break
         middle = 0.5 * (low + high)
         guess = least(map_fields(_secant, g_low, g_high, signs, low, high, high))
-        chord = (guess > low) & (guess < high)
+        chord = (guess >= low) & (guess <= high)
         if iteration >= _SECANT_ITERATIONS:
             chord = chord & (not chord)
-        guess = where(chord, guess, middle)
+        # a chord that meets an end is tried beyond the zero, within the tolerance: so the far end of the bracket comes
+        guess = where(chord, minimum(maximum(guess, low + 0.5 * tolerance), high - 0.5 * tolerance), middle)
         state = method.single(f, method.tables, t, guess, s, m, p, o)
         values = spread(f.events(minimum(t + guess, finish), state, m, p, o), t)
         after = any_field(map_fields(crossed, g_low, values, signs))
