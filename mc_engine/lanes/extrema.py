@@ -8,6 +8,7 @@ from mc_engine.lanes.physics_function import physics
 
 # what flights with adaptive steps track as one; a corner is a peak that is taken at the steps
 EVENT, PEAK, CORNER, LAST = 0.0, 1.0, 2.0, 3.0
+_ALIKE = 4.0  # times as strongly; a Gauss curve with a deviation of two steps bends up to 2.6 times as strongly
 
 
 @physics
@@ -20,6 +21,20 @@ def first_time(value, t):
 def crest(v0, v1, v2, best):
     """Mask: the middle one of three neighbouring values tops both and may top the best so far, or is not a number."""
     return not ((v1 < v0) | (v1 < v2) | (v1 + abs(v1 - v0) + abs(v1 - v2) <= best))
+
+
+@physics
+def smooth_where_bent_alike(smooth, v0, v1, v2, v3, v4, t0, t1, t2, t3, t4):
+    """`smooth` where five looks tell of no jump or corner: the curve bends at the middle one as beside it; else 0.
+
+    What no time lies before, or hardly any after, tells nothing.
+    """
+    a, b, c, d = t1 - t0, t2 - t1, t3 - t2, t4 - t3
+    before = ((v2 - v1) / b - (v1 - v0) / a) / (a + b)
+    bend = ((v3 - v2) / c - (v2 - v1) / b) / (b + c)
+    after = ((v4 - v3) / d - (v3 - v2) / c) / (c + d)
+    alike = ((a <= 0.0) | (bend >= _ALIKE * before)) & ((d <= 1e-3 * c) | (bend >= _ALIKE * after))
+    return where(alike, smooth, 0.0)
 
 
 @physics

@@ -40,8 +40,8 @@ from mc_engine.status import EVENT_LIMIT, NO_STOP, NOT_FINITE
 # restart(past, lanes) : past without the earlier steps of some lanes, whose discrete state has changed
 # advance(f, tables, past, t, finish, h, s, m, p, o, flying) : (state at the end of a grid step, past)
 # single(f, tables, t, h, s, m, p, o) : state after a step of length h [s], lanes, from a state alone
-# track(past, number, closing, lanes, h, smooth, seen, times, lasts, best, when, last) : running extrema and past after
-# one more look at the outputs, the `number`th of the flight, the newest of `seen`; closing : it is the last of `lanes`
+# track(past, number, t, h, closing, lanes, smooth, seen, lasts, best, when, last) : running extrema and past after one
+# more look at the outputs, the `number`th of the flight, at t, the newest of five `seen`; closing : the last of `lanes`
 Method = namedtuple("Method", "begin restart advance single track tables")
 MOST_SLOPES = 11
 # What a multistep method keeps of the tracked outputs at the last grid points, the latest of number n in place
@@ -88,29 +88,69 @@ def _advance(f, tables, past, t, finish, h, s, m, p, o, flying):
 begin, restart, advance = compile_inline(_begin), compile_inline(_restart), compile_inline(_advance)
 
 
-def _track_by_three(lanes, chords, smooth, seen, times, lasts, best, when, last):
-    """Running extrema after one more look, by the parabola through three looks; last times by a chord in `chords`."""
-    v0, v1, v2 = seen
-    t0, t1, t2 = times
-    crests = lanes & any_field(map_fields(extrema.crest, v0, v1, v2, best))
+def _grid_time(number, h, t):
+    """Time [s] of a grid point in every lane, of one before the first that of the first.  t : any number in lanes."""
+    return 0.0 * t + float(max(number, 0)) * h
+
+
+grid_time = compile_inline(_grid_time)
+
+
+def _last_five(number, t, h, closing):
+    """Times of five looks, see `track_by_three`."""
+    before, ago = number - 1, grid_time(number - 2, h, t)
+    if closing:  # the last twice: nothing is known of what comes after it
+        return grid_time(number - 3, h, t), ago, grid_time(before, h, t), t, t
+    return grid_time(number - 4, h, t), grid_time(number - 3, h, t), ago, grid_time(before, h, t), t
+
+
+last_five = compile_inline(_last_five)
+
+
+def _track_by_three(number, t, h, closing, lanes, smooth, seen, best, when):
+    """Running extrema (best, when) after one more look, by the parabola through three looks where they tell of no jump.
+
+    seen : five looks, of which the third may be a crest.  They are the last of the flight, and the newest of them has
+    this number, at t; if `closing` the newest stands there twice, so that the one before it may be the crest.
+    """
+    v0, v1, v2, v3, v4 = seen
+    crests = lanes & any_field(map_fields(extrema.crest, v1, v2, v3, best))
     if any_lane(crests):
-        when = map_fields(extrema.crest_time, when, best, v0, v1, v2, t0, t1, t2, smooth, crests)
-        best = map_fields(extrema.crest_value, best, when, v0, v1, v2, t0, t1, t2, smooth, crests)
-    w1, w2 = lasts
-    last = map_fields(extrema.above, last, w2, t2, lanes)
-    if any_lane(any_field(map_fields(extrema.falls, w1, w2, chords))):
-        last = map_fields(extrema.fall_time, last, w1, w2, t1, t2, chords)
-    return best, when, last
+        t0, t1, t2, t3, t4 = last_five(number, t, h, closing)
+        curved = map_fields(extrema.smooth_where_bent_alike, smooth, v0, v1, v2, v3, v4, t0, t1, t2, t3, t4)
+        when = map_fields(extrema.crest_time, when, best, v1, v2, v3, t1, t2, t3, curved, crests)
+        best = map_fields(extrema.crest_value, best, when, v1, v2, v3, t1, t2, t3, curved, crests)
+    return best, when
 
 
 track_by_three = compile_inline(_track_by_three)
 
 
-def _track(past, number, closing, lanes, h, smooth, seen, times, lasts, best, when, last):
-    return *track_by_three(lanes, lanes, smooth, seen, times, lasts, best, when, last), past
+def _last_above(number, t, h, lanes, chords, lasts, last):
+    """Last times above zero after one more look; where it fell since the look before, by a chord in `chords`."""
+    w1, w2 = lasts
+    last = map_fields(extrema.above, last, w2, t, lanes)
+    if any_lane(any_field(map_fields(extrema.falls, w1, w2, chords))):
+        last = map_fields(extrema.fall_time, last, w1, w2, grid_time(number - 1, h, t), t, chords)
+    return last
 
 
-track = compile_inline(_track)
+last_above = compile_inline(_last_above)
+
+
+def _track(past, number, t, h, closing, lanes, smooth, seen, lasts, best, when, last):
+    best, when = track_by_three(number, t, h, False, lanes, smooth, seen, best, when)
+    if closing:
+        best, when = track_by_three(number, t, h, True, lanes, smooth, newest_twice(seen), best, when)
+    return best, when, last_above(number, t, h, lanes, lanes, lasts, last), past
+
+
+def _newest_twice(seen):
+    """The last four of five looks, and the newest again."""
+    return seen[1], seen[2], seen[3], seen[4], seen[4]
+
+
+newest_twice, track = compile_inline(_newest_twice), compile_inline(_track)
 
 
 def _looks_from(v, w, t):
@@ -162,30 +202,30 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
     s, m = f.states_of(spread(f.initial(p, o), t)), spread(f.start(p, o), t)
     m = spread(f.control(t, s, m, p, o, Draws(key, case, 0.0)), t)
     seen = look_shared(f, t, s, m, p, o)
-    v0 = v1 = best = f.peaks_of(seen)
-    w1 = f.lasts_of(seen)
-    when, last = map_fields(extrema.first_time, v1, t), map_fields(extrema.first_time, w1, t)
-    t0 = t1 = t2 = t
-    past = method.begin(method.tables, stage_memory(s, MOST_SLOPES), looks_from(v1, w1, t), s, t)
+    v0 = v1 = v2 = v3 = best = f.peaks_of(seen)
+    w3 = f.lasts_of(seen)
+    when, last = map_fields(extrema.first_time, v3, t), map_fields(extrema.first_time, w3, t)
+    begin = t
+    past = method.begin(method.tables, stage_memory(s, MOST_SLOPES), looks_from(v3, w3, t), s, t)
     last_memory = m
     for k in range(n_steps):
         recorded = history.shape[0] > 0 and k % stride == 0
         if k > 0 and k % control_every == 0:
             if recorded:
-                record_row(f, history, rows, flying, t2, s, m, p, o)
-            held = spread(f.control(t2, s, m, p, o, Draws(key, case, float(k // control_every))), t)
+                record_row(f, history, rows, flying, begin, s, m, p, o)
+            held = spread(f.control(begin, s, m, p, o, Draws(key, case, float(k // control_every))), t)
             past = method.restart(past, unequal(m, held, t))
             m = held  # of lanes that have ended, too: what they held then is in `last_memory`
-        seen = spread(f.observe(t2, s, m, p, o), t)
-        v2, w2 = f.peaks_of(seen), f.lasts_of(seen)
-        smooth, values, times, lasts = f.smooth_of(v2), (v0, v1, v2), (t0, t1, t2), (w1, w2)
-        best, when, last, past = method.track(past, k, False, flying, h, smooth, values, times, lasts, best, when, last)
+        seen = spread(f.observe(begin, s, m, p, o), t)
+        v4, w4 = f.peaks_of(seen), f.lasts_of(seen)
+        smooth, looks, lasts = f.smooth_of(v4), (v0, v1, v2, v3, v4), (w3, w4)
+        best, when, last, past = method.track(past, k, begin, h, False, flying, smooth, looks, lasts, best, when, last)
         if recorded:  # looked at anew: so the outputs that only a history wants cost nothing where there is none
-            record_row(f, history, rows, flying, t2, s, m, p, o)
+            record_row(f, history, rows, flying, begin, s, m, p, o)
         # the grid's own time, not a sum of steps: no rounding piles up, and a sample falls where it belongs
-        finish = case * 0.0 + float(k + 1) * h
+        finish = grid_time(k + 1, h, case)
         end, memory, now, stopped, overrun, broken, past = step(
-            f, method, past, has_events, t2, finish, h, s, m, p, o, flying, history, rows
+            f, method, past, has_events, begin, finish, h, s, m, p, o, flying, history, rows
         )
         moved = flying & (not broken)
         if any_lane(not moved):  # a branch, which the processor predicts: the next step need not wait for the check
@@ -198,18 +238,17 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
         if any_lane(at_end | broken):
             last_memory = select(at_end | broken, m, last_memory)
             seen = look_shared(f, t, s, m, p, o)
-            v3, w3 = f.peaks_of(seen), f.lasts_of(seen)
-            values, times, lasts = (v1, v2, v3), (t1, t2, t), (w2, w3)
-            best, when, last, _ = method.track(
-                past, k + 1, True, at_end, h, smooth, values, times, lasts, best, when, last
-            )
-            when = map_fields(extrema.end_time, when, best, v3, t, at_end, t)
-            best = map_fields(extrema.end_value, best, v3, at_end)
+            v5, w5 = f.peaks_of(seen), f.lasts_of(seen)
+            looks, lasts = (v1, v2, v3, v4, v5), (w4, w5)
+            best, when, last, _ = method.track(past, k + 1, t, h, True, at_end, smooth, looks, lasts, best, when, last)
+            when = map_fields(extrema.end_time, when, best, v5, t, at_end, t)
+            best = map_fields(extrema.end_value, best, v5, at_end)
             if history.shape[0] > 0:
                 record_row(f, history, rows, at_end, t, s, m, p, o)
         if not any_lane(flying):
             break
-        v0, v1, w1, t0, t1, t2 = v1, v2, w2, t1, t2, finish
+        v0, v1, v2, v3, w3 = v1, v2, v3, v4, w4
+        begin = finish
     return t, s, last_memory, status, flying, best, when, last
 
 

@@ -24,7 +24,7 @@ import numpy as np
 from mc_engine.lanes import extrema
 from mc_engine.lanes.adaptive_step import attempt
 from mc_engine.lanes.compiler import compile_callable, compile_inline
-from mc_engine.lanes.fixed_step import LOOKS, track_by_three
+from mc_engine.lanes.fixed_step import LOOKS, grid_time, last_above, newest_twice, track_by_three
 from mc_engine.lanes.functions import any_lane, replace, where
 from mc_engine.lanes.physics_function import physics
 from mc_engine.lanes.runge_kutta_pairs import DOP853, LARGEST_STAGES
@@ -298,50 +298,52 @@ def _search(looks, number, t, h, count, closing, lanes, smooth, best, when, last
 search = compile_callable(_search)
 
 
-def _track_by_all(looks, number, closing, lanes, count, h, smooth, seen, times, lasts, best, when, last):
+def _track_by_all(looks, number, t, h, closing, lanes, count, smooth, seen, lasts, best, when, last):
     """Running extrema after a look that may change them, or that belongs to a motion of few looks.
 
     count : how many looks the motion has had, this one included
     """
     ended = lanes & (count <= looks.count) & (looks.count >= 3.0)
     if any_lane(ended):
-        best, when, last = search(looks, number - 1, times[1], h, looks.count, True, ended, smooth, best, when, last)
-    put_stage(looks.peaks, number % LOOKS, seen[2])
+        before = grid_time(number - 1, h, t)
+        best, when, last = search(looks, number - 1, before, h, looks.count, True, ended, smooth, best, when, last)
+    put_stage(looks.peaks, number % LOOKS, seen[4])
     put_stage(looks.lasts, number % LOOKS, lasts[1])
     # around the end of a motion three looks have to do
-    corner, v0, v1, v2 = map_fields(_at_corner, smooth, count < 3.0), seen[0], seen[1], seen[2]
-    best, when, last = track_by_three(lanes, lanes & (count < 2.0), corner, seen, times, lasts, best, when, last)
-    crests = any_field(map_fields(_smooth_crest, v0, v1, v2, best, smooth))
+    corner, v1, v2, v3 = map_fields(_at_corner, smooth, count < 3.0), seen[2], seen[3], seen[4]
+    best, when = track_by_three(number, t, h, True, lanes, corner, newest_twice(seen), best, when)
+    last = last_above(number, t, h, lanes, lanes & (count < 2.0), lasts, last)
+    crests = any_field(map_fields(_smooth_crest, v1, v2, v3, best, smooth))
     falls = any_field(map_fields(extrema.falls, lasts[0], lasts[1], lanes))
     wanted = lanes & ((count == float(LOOKS)) | ((crests | falls) & (count > float(LOOKS))))
     if any_lane(wanted):
-        best, when, last = search(looks, number, times[2], h, count, False, wanted, smooth, best, when, last)
+        best, when, last = search(looks, number, t, h, count, False, wanted, smooth, best, when, last)
     closed = lanes & (count >= 3.0)
     if closing and any_lane(closed):
-        best, when, last = search(looks, number, times[2], h, count, True, closed, smooth, best, when, last)
+        best, when, last = search(looks, number, t, h, count, True, closed, smooth, best, when, last)
     return best, when, last
 
 
 track_by_all = compile_callable(_track_by_all)
 
 
-def _track(past, number, closing, lanes, h, smooth, seen, times, lasts, best, when, last):
+def _track(past, number, t, h, closing, lanes, smooth, seen, lasts, best, when, last):
     """Running extrema and past after one more look, see `Method`; it is of the motion that its slope will be of."""
-    looks, count, v0, v1, v2 = past.looks, past.known + 1.0, seen[0], seen[1], seen[2]
-    crests = lanes & any_field(map_fields(extrema.crest, v0, v1, v2, best))
+    looks, count, v1, v2, v3 = past.looks, past.known + 1.0, seen[2], seen[3], seen[4]
+    crests = lanes & any_field(map_fields(extrema.crest, v1, v2, v3, best))
     if any_lane(crests):  # of outputs with corners that is all
-        when = map_fields(extrema.end_time, when, best, v1, times[1], crests, best)
-        best = map_fields(extrema.end_value, best, v1, crests)
-    smooth_crests = any_field(map_fields(_smooth_crest, v0, v1, v2, best, smooth))
+        when = map_fields(extrema.end_time, when, best, v2, grid_time(number - 1, h, t), crests, best)
+        best = map_fields(extrema.end_value, best, v2, crests)
+    smooth_crests = any_field(map_fields(_smooth_crest, v1, v2, v3, best, smooth))
     falls = any_field(map_fields(extrema.falls, lasts[0], lasts[1], lanes))
     if closing or any_lane(lanes & (smooth_crests | falls | (count <= float(LOOKS)))):
         best, when, last = track_by_all(
-            looks, number, closing, lanes, count, h, smooth, seen, times, lasts, best, when, last
+            looks, number, t, h, closing, lanes, count, smooth, seen, lasts, best, when, last
         )
     else:
-        put_stage(looks.peaks, number % LOOKS, v2)
+        put_stage(looks.peaks, number % LOOKS, v3)
         put_stage(looks.lasts, number % LOOKS, lasts[1])
-        last = map_fields(extrema.above, last, lasts[1], times[2], lanes)
+        last = map_fields(extrema.above, last, lasts[1], t, lanes)
     return best, when, last, replace(past, looks=replace(looks, count=count))
 
 

@@ -8,6 +8,7 @@ from mc_engine.flight.flight import fly
 from mc_engine.model import load_model
 
 FOLDER = Path(__file__).resolve().parent / "models"
+CORNERS = load_model("corners.py", FOLDER)
 OSCILLATOR = load_model("oscillator.py", FOLDER)
 RAIL = load_model("rail.py", FOLDER)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from flown_models import FOLDER, OSCILLATOR, flown, inputs_of
+from flown_models import CORNERS, FOLDER, OSCILLATOR, flown, inputs_of
 
 from mc_engine.flight.flight import fly_history
 from mc_engine.lanes.extrema import crest, crest_time, crest_value
@@ -57,6 +57,22 @@ def test_a_quantity_with_corners_never_exceeds_its_values_at_the_steps(columns):
         assert columns["sampled_top_km"][case] == history["x_km"][at]
         assert columns["sampled_top_time_s"][case] == history["t_s"][at]
     assert (columns["sampled_top_km"] <= columns["top_km"]).all()
+
+
+def test_an_extreme_never_goes_beyond_a_corner_or_a_jump():
+    # steps of 0.25: the wave stays above its limit, and the relay on one side, for more than eight steps
+    phases = RANDOM.uniform(0.0, 6.0, 200)
+    # a limit that is left in the first two steps, or reached in the last two before 12, is not told from a crest
+    left, reached = 5 * np.pi / 6 - phases, phases + 12.0 - np.pi / 6
+    phases = phases[(left % (2 * np.pi) > 0.5) & (reached % (2 * np.pi) > 0.5)]
+    columns = flown(CORNERS, phase_rad=phases)
+    np.testing.assert_array_equal(columns["limited_top"], 1.0)
+    np.testing.assert_array_equal(columns["relay_top"], 1.0)
+    np.testing.assert_array_equal(columns["relay_bottom"], -1.0)
+    half_turns = columns["saw_top"] / 0.25  # it is looked at once a step, and grows by a step from look to look
+    np.testing.assert_allclose(half_turns, np.round(half_turns), rtol=1e-12)
+    assert (np.abs(half_turns - 12.0) <= 1.0).all()
+    np.testing.assert_allclose(columns["wave_top"], 2.0, rtol=1e-4)  # beside them, the curve through the steps: 8e-3
 
 
 def test_the_last_time_above_a_level_is_where_the_value_falls_through_it():
