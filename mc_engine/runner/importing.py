@@ -4,6 +4,8 @@ The table has a row for each case of the campaign: `case_id`, the dispersed inpu
 any `status` and `reason`.  `mc-engine sample` gives the inputs; those in the table are compared with them.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +29,7 @@ from mc_engine.suggestions import hint
 
 _SAME = 1e-9  # of an input, which a CSV may round
 _MOST = 20  # problems of one table
+_NOMINAL = -1  # the case_id of the nominal case
 
 
 def import_results(campaign: Campaign, file: Path, out: Path, history: Path | None = None) -> Store:
@@ -36,11 +39,9 @@ def import_results(campaign: Campaign, file: Path, out: Path, history: Path | No
     Raises CampaignError with every mistake of the tables.
     """
     problems: list[Problem] = []
-    try:
+    with _problems_of(file):
         table = {name: np.asarray(cells) for name, cells in read_columns(file).items()}
-        past = None if history is None else _read_history(campaign, history)
-    except FileFault as fault:
-        raise CampaignError(file.name, [Problem("", str(fault))]) from None
+    past = None if history is None else _read_history(campaign, history)
     rows, nominal = _results(campaign, file, table, problems)
     if problems:
         raise CampaignError(file.name, problems[:_MOST])
@@ -57,6 +58,15 @@ def import_results(campaign: Campaign, file: Path, out: Path, history: Path | No
     return store
 
 
+@contextmanager
+def _problems_of(file: Path) -> Iterator[None]:
+    """Turn a FileFault into the CampaignError of this table."""
+    try:
+        yield
+    except FileFault as fault:
+        raise CampaignError(file.name, [Problem("", str(fault))]) from None
+
+
 def _results(campaign: Campaign, file: Path, table: Columns, problems: list[Problem]) -> tuple[Columns, Columns]:
     """(rows of all cases but case_id, the nominal row), with what is wrong added to `problems`."""
     inputs = [dispersion.name for dispersion in campaign.dispersions]
@@ -71,23 +81,44 @@ def _results(campaign: Campaign, file: Path, table: Columns, problems: list[Prob
         problems.append(Problem("", str(fault)))
         return {}, {}
     ids = values["case_id"]
-    order = np.argsort(ids, kind="stable")
-    order = order[ids[order] >= 0]
-    if not np.array_equal(ids[order], np.arange(campaign.cases)):
-        missing = sorted({*range(campaign.cases)} - {*ids.tolist()})
-        which = f"case {missing[0]} is missing" if missing else "a case is there twice, or is none of the campaign's"
-        has = f"the campaign has the cases 0 to {campaign.cases - 1}; --cases takes another number of them"
-        problems.append(Problem("case_id", f"{which}; {has}"))
+    problems += _wrong_ids(campaign, ids)
+    if problems:
         return {}, {}
+    order = np.argsort(ids)
+    order = order[ids[order] != _NOMINAL]
     drawn = case_table(campaign, np.arange(campaign.cases))
     _refuse_unknown_words(table, problems)
-    place = np.flatnonzero(ids == -1)[:1]
+    place = np.flatnonzero(ids == _NOMINAL)
     for name in inputs:
         _compare(name, table[name][order], drawn[name], file, problems)
         wanted = typed_column([campaign.nominal[name]] * place.size)
         _compare(name, table[name][place], wanted, file, problems, nominal=True)
     rows = {name: values[name][order] for name in metrics}
     return {**drawn, **_judged(campaign, table, order, rows)}, _nominal(campaign, table, place, values, metrics)
+
+
+def _wrong_ids(campaign: Campaign, ids: np.ndarray) -> list[Problem]:
+    """What is wrong with the case ids of the results: at most one problem."""
+    given, counts = np.unique(ids, return_counts=True)
+    missing = np.setdiff1d(np.arange(campaign.cases), given)
+    if problems := _unknown_ids(campaign, ids):
+        return problems
+    if missing.size:
+        has = f"the campaign has the cases 0 to {campaign.cases - 1}; --cases takes another number of them"
+        return [Problem("case_id", f"case {missing[0]} is missing; {has}")]
+    twice = given[counts > 1]
+    return [Problem("case_id", f"case {twice[0]:.0f} is there twice; remove one of its rows")] if twice.size else []
+
+
+def _unknown_ids(campaign: Campaign, ids: np.ndarray) -> list[Problem]:
+    """The first case id of a table that the campaign has not."""
+    unknown = np.flatnonzero(~np.isin(ids, np.arange(_NOMINAL, campaign.cases)))
+    if not unknown.size:
+        return []
+    has = f"it has the cases 0 to {campaign.cases - 1}, and {_NOMINAL} for the nominal case"
+    way_out = "remove the row, or choose another number of cases with --cases"
+    row = unknown[0]
+    return [Problem("case_id", f"row {row + 1}: {ids[row]:.15g} is no case of the campaign; {has}; {way_out}")]
 
 
 def _numbers_or_nan(file: Path, name: str, cells: np.ndarray) -> np.ndarray:
@@ -173,10 +204,24 @@ def _nominal(campaign: Campaign, table: Columns, place: np.ndarray, values: Colu
 
 
 def _read_history(campaign: Campaign, file: Path) -> Columns:
-    """The columns of a history table; FileFault if one is missing."""
-    table = read_columns(file)
-    names = ["case_id", "t_s", *(quantity.name for quantity in campaign.model.quantities)]
-    if missing := [name for name in names if name not in table]:
-        raise FileFault(f'"{file.name}" has no column "{missing[0]}"')
-    columns = {name: numbers(file, name, np.asarray(table[name])) for name in names}
+    """The columns of a history table; CampaignError for one that is missing, unknown cases, and times that fall."""
+    with _problems_of(file):
+        table = read_columns(file)
+        names = ["case_id", "t_s", *(quantity.name for quantity in campaign.model.quantities)]
+        if missing := [name for name in names if name not in table]:
+            raise FileFault(f'"{file.name}" has no column "{missing[0]}"')
+        columns = {name: numbers(file, name, np.asarray(table[name])) for name in names}
+    if problems := _unknown_ids(campaign, columns["case_id"]) or _falling_times(columns["case_id"], columns["t_s"]):
+        raise CampaignError(file.name, problems)
     return {**columns, "case_id": columns["case_id"].astype(np.int64)}
+
+
+def _falling_times(ids: np.ndarray, times: np.ndarray) -> list[Problem]:
+    """The first row of a history whose time is before that of the case's row above it."""
+    order = np.argsort(ids, kind="stable")
+    falls = np.flatnonzero((np.diff(ids[order]) == 0) & (np.diff(times[order]) < 0))
+    if not falls.size:
+        return []
+    before, row = order[falls[0]], order[falls[0] + 1]
+    what = f"{number(times[row])} s follows {number(times[before])} s of case {ids[row]:.0f}"
+    return [Problem("t_s", f"row {row + 1}: {what}; sort the rows of each case by time")]

@@ -204,6 +204,36 @@ def test_results_of_other_inputs_are_refused(tmp_path, flown):
         import_results(campaign, tmp_path / "results.csv", tmp_path / "run")
 
 
+@pytest.mark.parametrize(
+    ("table", "row", "change", "sentence"),
+    [
+        ("results", 3, {"case_id": -2}, r"case_id: row 4: -2 is no case of the campaign; it has the cases 0 to 99, and -1"),
+        ("results", 3, {"case_id": 2}, "case_id: case 3 is missing"),
+        ("results", 101, {"case_id": -2}, "case_id: row 102: -2 is no case of the campaign"),
+        ("results", 101, {"case_id": 2}, "case_id: case 2 is there twice; remove one of its rows"),
+        ("results", 101, {"case_id": -1}, "case_id: case -1 is there twice"),
+        ("history", 0, {"case_id": -2}, r"history.csv: 1 problem\s+case_id: row 1: -2 is no case of the campaign"),
+        ("history", 0, {"case_id": 100}, "case_id: row 1: 100 is no case .* remove the row, or .* --cases"),
+        ("history", 0, {"case_id": 0.5}, "case_id: row 1: 0.5 is no case of the campaign"),
+        ("history", 1, {"t_s": -0.5}, r"t_s: row 2: -0.5 s follows 0 s of case -1; sort the rows of each case by time"),
+    ],
+)
+def test_unknown_cases_and_falling_times_of_imported_tables_are_refused(tmp_path, flown, table, row, change, sentence):
+    store = flown["case"]
+    nominal = pd.DataFrame([{name: value for name, value in store.nominal().items() if name in store.cases()}])
+    results = pd.concat([store.cases(), nominal.assign(case_id=-1)], ignore_index=True)
+    tables = {"results": results, "history": store.histories()}
+    changed = tables[table].reindex(range(max(len(tables[table]), row + 1))).ffill()
+    tables[table] = changed.astype(dict.fromkeys(change, float)).fillna("")
+    tables[table].loc[row, [*change]] = [*change.values()]
+    for name, frame in tables.items():
+        frame.to_csv(tmp_path / f"{name}.csv", index=False)
+    campaign = load_campaign(python_campaign(tmp_path / "ball"))
+    with pytest.raises(CampaignError, match=sentence):
+        import_results(campaign, tmp_path / "results.csv", tmp_path / "run", tmp_path / "history.csv")
+    assert not (tmp_path / "run").exists()
+
+
 def test_words_and_numbers_of_imported_results_are_checked(tmp_path, flown):
     table = flown["case"].cases().astype({"fall_time_s": object})
     campaign = load_campaign(python_campaign(tmp_path / "ball"))
