@@ -24,7 +24,7 @@ import numpy as np
 
 from mc_engine.errors import EngineError, StoreError
 from mc_engine.flight.flyer import NOMINAL_NOISE
-from mc_engine.flight.program_flight import Flown, ProgramFlight, flown, in_time
+from mc_engine.flight.program_flight import Flown, ProgramFlight, flown, in_time, numeric
 from mc_engine.model.faults import fault_of
 from mc_engine.model.simulator import Refuse, Simulator, load_simulator
 from mc_engine.process_tree import adopt_orphans, die_with_parent, end_children, own_children
@@ -235,7 +235,7 @@ def _read(simulator: Simulator, given: Any, history: bool) -> Flown:
     values = {}
     for metric in simulator.metrics:
         try:
-            values[metric.name] = float(metrics[metric.name])
+            values[metric.name] = float(numeric(metrics[metric.name]))
         except (TypeError, ValueError):
             value = clean(repr(metrics[metric.name])[:60])
             raise ValueError(f'"{metric.name}" is {value}, which is no number') from None
@@ -251,7 +251,7 @@ def _read_batch(simulator: Simulator, given: Any, order: Order) -> tuple[dict[st
     arrays = {}
     for metric in simulator.metrics:
         try:
-            column = np.asarray(metrics[metric.name], dtype=np.float64)
+            column = np.asarray(numeric(metrics[metric.name]), dtype=np.float64)
         except (TypeError, ValueError):
             raise ValueError(f'"{metric.name}" is no array of numbers') from None
         if column.shape != order.noise.shape:
@@ -286,7 +286,7 @@ def _history(simulator: Simulator, table: Any) -> dict[str, np.ndarray]:
         if name not in known:
             raise ValueError(f'the history has no column "{name}"')
         try:
-            columns[name] = np.asarray(table[name], dtype=np.float64)
+            columns[name] = np.asarray(numeric(table[name]), dtype=np.float64)
         except (TypeError, ValueError):
             raise ValueError(f'the column "{name}" of the history is no numbers') from None
     if len(counts := {np.size(column): None for column in columns.values()}) > 1:

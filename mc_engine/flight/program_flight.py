@@ -193,6 +193,15 @@ class ProgramFlight:
         return in_time({name: table[:, place] for name, place in zip(wanted, places, strict=True)})
 
 
+def numeric(given: Any) -> Any:
+    """What was given; TypeError for text and truth values, which Python and NumPy would take as numbers."""
+    kind = getattr(getattr(given, "dtype", None), "kind", "")
+    items = np.ravel(given) if kind == "O" else given if isinstance(given, list | tuple) else [given]
+    if kind in ("b", "S", "U") or (kind in ("", "O") and any(isinstance(item, str | bytes | bool) for item in items)):
+        raise TypeError
+    return given
+
+
 def in_time(history: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The history as it is; ValueError with a sentence unless its times are numbers that never fall."""
     times = history["t_s"]

@@ -26,6 +26,13 @@ PYTHON_FAULTS = {
     "nothing": ("return None", "no-result", "returned NoneType"),
     "NaN": ("return {'fall_time_s': np.nan, 'impact_speed_m_s': 1.0}", "not-finite", "is not a number"),
     "wrong key": ("return {'time': 1.0, 'impact_speed_m_s': 1.0}", "no-result", '"fall_time_s" is missing'),
+    "text": ("return {'fall_time_s': '1.0', 'impact_speed_m_s': 1.0}", "no-result", "is '1.0', which is no number"),
+    "truth": ("return {'fall_time_s': 1.0, 'impact_speed_m_s': True}", "no-result", "is True, which is no number"),
+    "array of truth": (
+        "return {'fall_time_s': 1.0, 'impact_speed_m_s': np.array(True)}",
+        "no-result",
+        "is array(True), which is no number",
+    ),
     "refused": ("raise Refuse('too heavy')", "refused", "too heavy"),
     "loud": ("print('x' * 5_000_000)\n    raise ValueError('loud')", "crashed", "ValueError: loud"),
 }
@@ -189,6 +196,8 @@ HISTORIES = {
     ),
     "column": ("pd.DataFrame({'t_s': [0.0], 'speed': [1.0]})", 'the history has no column "speed_m_s"'),
     "word": ("pd.DataFrame({'t_s': [0.0], 'speed_m_s': ['fast']})", 'column "speed_m_s" of the history is no numbers'),
+    "text": ("{'t_s': [0.0], 'speed_m_s': ['1.0']}", 'column "speed_m_s" of the history is no numbers'),
+    "truth": ("pd.DataFrame({'t_s': [0.0], 'speed_m_s': [True]})", 'column "speed_m_s" of the history is no numbers'),
     "lengths": ("{'t_s': [0.0, 1.0], 'speed_m_s': [1.0]}", "columns of the history have 2 and 1 rows"),
     "number": ("3.0", "the history is a float; it must be a DataFrame"),
 }
@@ -205,6 +214,14 @@ def test_a_history_that_cannot_be_read_is_no_result(tmp_path, options):
     assert set(rows["status"]) == {"no-result"}
     for said, (_, reason) in zip(rows["reason"], HISTORIES.values(), strict=True):
         assert reason in said
+
+
+@pytest.mark.parametrize("given", ["np.full(4, '1.0')", "pd.Series(['1.0'] * 4)", "[True] * 4", "time > 0.0"])
+def test_text_and_truth_values_of_a_batch_are_no_numbers(tmp_path, given):
+    fault = f"time = np.ones(4)\nreturn {{'fall_time_s': {given}, 'impact_speed_m_s': time}}"
+    file = python_campaign(tmp_path / "ball", cases=4, fault=fault, options="batch=True,")
+    table = run(load_campaign(file), tmp_path / "run", workers=1).cases()
+    refuse_others(table, (0, 1, 2, 3), "no-result", '"fall_time_s" is no array of numbers')
 
 
 def test_a_case_of_a_batch_that_crashes_is_found(tmp_path, sound):
