@@ -5,6 +5,7 @@ EngineError
   ModelError        the model of the campaign breaks its contract
   StoreError        the run directory is damaged, busy, or belongs to another campaign
     DiskError       the disk is full, write-protected or broken; committed cases are safe
+    UsageError      what was asked of a run, a folder or a URL is not possible; nothing is damaged
   RunInterrupted    the run was stopped; committed cases are safe, and `resume` completes the run
   WorkersLost       the workers cannot be reached, or die repeatedly
 """
@@ -92,6 +93,10 @@ class StoreError(EngineError):
 
 class DiskError(StoreError):
     """The disk refused an operation; the text names the path.  What was committed before is safe."""
+
+
+class UsageError(StoreError):
+    """What was asked of a run, a folder or a URL is not possible, and nothing is damaged; the text says what is."""
 
 
 class RunInterrupted(EngineError):

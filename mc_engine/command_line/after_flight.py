@@ -19,6 +19,7 @@ from mc_engine.command_line.app import (
     new_file,
     object_store,
     ranges,
+    refuse_unwritable_file,
     run_at,
     write_reports,
 )
@@ -193,8 +194,7 @@ def export(
         leave(USAGE, f"--out is missing: {store_url(place)} is a URL; name a file here")
     store = existing_run(run_at(place))
     path = out if out is not None else store.path / f"end_states.{kind}"
-    if not path.parent.is_dir():
-        leave(USAGE, f"--out {path}: there is no folder {path.parent}")
+    refuse_unwritable_file("--out", path)
     from mc_engine.studies.end_states import end_columns, write_csv
 
     names = end_columns(store) if columns is None else _named_columns(store, columns)

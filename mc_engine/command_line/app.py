@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
-from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError
+from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError, UsageError
 from mc_engine.interruption import INTERRUPTED, interruption_message, under_way
 from mc_engine.numbers_in_text import LARGEST_WHOLE, is_real, is_whole
 from mc_engine.shell_words import shell_word
@@ -162,6 +162,8 @@ def exit_status() -> Iterator[None]:
             yield
     except (RunInterrupted, DiskError) as error:  # both can be resumed
         leave(INTERRUPTED, str(error))
+    except UsageError as error:
+        leave(USAGE, str(error))
     except StoreError as error:
         leave(DAMAGED, str(error))
     except EngineError as error:  # of the campaign, the model, or a package that is missing
@@ -245,6 +247,14 @@ def refuse_occupied_folder(path: Path) -> None:
     existing = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
     if not (existing.is_dir() and os.access(existing, os.W_OK)):
         leave(USAGE, f"--out {path}: {existing} is no folder that can be written to")
+
+
+def refuse_unwritable_file(option: str, path: Path) -> None:
+    """End the command if no file can be made at `path`; called before the work that the file is to hold."""
+    if not path.parent.is_dir():
+        leave(USAGE, f"{option} {path}: there is no folder {path.parent}")
+    if path.is_dir():
+        leave(USAGE, f"{option} {path}: is a folder; name a file")
 
 
 def counted(things: Any, word: str) -> str:

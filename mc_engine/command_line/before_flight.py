@@ -21,6 +21,7 @@ from mc_engine.command_line.app import (
     exit_status,
     leave,
     new_file,
+    refuse_unwritable_file,
 )
 from mc_engine.numbers_in_text import LEAST_SHARE
 from mc_engine.safe_path import safe_environment
@@ -182,8 +183,8 @@ def sample(
 
     if out is not None and out.suffix not in SUFFIXES:
         leave(USAGE, f"--out {out}: the name must end in {' or '.join(SUFFIXES)}")
-    if out is not None and not out.parent.is_dir():
-        leave(USAGE, f"--out {out}: there is no folder {out.parent}")
+    if out is not None:
+        refuse_unwritable_file("--out", out)
     campaign = load_campaign(file, cases=cases)
     table = drawn_inputs(campaign)
     if out is None:

@@ -23,6 +23,7 @@ from mc_engine.command_line.app import (
     new_file,
     new_folder,
     refuse_occupied_folder,
+    refuse_unwritable_file,
     run_at,
     write_reports,
 )
@@ -207,6 +208,8 @@ def compare(
     wrong = [path for path in report or [] if path.suffix not in (".html", ".pdf")]
     if wrong:
         leave(USAGE, f"--report {wrong[0]}: the name must end in .html or .pdf")
+    for path in report or ():
+        refuse_unwritable_file("--report", path)
     if not 0.0 < alpha < 1.0:
         leave(USAGE, f"--alpha {alpha:g}: must lie between 0 and 1, such as 0.003")
     a, b = existing_run(run_at(before)), existing_run(run_at(after))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.durable_file import make_way, write_inside
-from mc_engine.errors import CampaignError, EngineError, ModelError, Problem, StoreError
+from mc_engine.errors import CampaignError, EngineError, ModelError, Problem, StoreError, UsageError
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.model.record import Model, load_model, sources_of
 from mc_engine.model.simulator import Simulator, load_simulator
@@ -25,8 +25,8 @@ def campaign_of(store: "Store", directory: Path | None = None) -> Campaign:
     """The campaign of a run, with its present number of cases.
 
     directory : folder of the campaign's files, by default the run directory with its copies.
-    StoreError if its results were imported, or if the model, the campaign or the engine's sources have changed since
-    the run began.
+    UsageError if its results were imported; StoreError if the model, the campaign or the engine's sources have changed
+    since the run began.
     """
     from mc_engine.campaign.sensitivity_design import companion
     from mc_engine.campaign.upstream import COMPANION
@@ -37,7 +37,7 @@ def campaign_of(store: "Store", directory: Path | None = None) -> Campaign:
 
     if imported := store.manifest.get("imported"):
         why = f"its results were imported from {imported['file']}; the engine did not fly them"
-        raise StoreError(f"{store.path}: {why}")
+        raise UsageError(f"{store.path}: {why}")
     store.check_companions()
     recorded = store.manifest["campaign"]
     model, contract = store.manifest.get("model", {}), store.manifest.get("seed_contract")

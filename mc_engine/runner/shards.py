@@ -16,7 +16,7 @@ import pyarrow as pa
 
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.search import campaign_names
-from mc_engine.errors import StoreError
+from mc_engine.errors import StoreError, UsageError
 from mc_engine.flight.chunks import chunk_size, chunks_of
 from mc_engine.runner.flown_campaign import campaign_of, companions_of
 from mc_engine.runner.manifest import columns_of, manifest_of
@@ -79,7 +79,7 @@ def merge_shards(out: Path, folders: Sequence[Path], chunk: int | None = None) -
 
     folders : run directories of shards, in any order; they may overlap or be incomplete.  chunk : cases of a part, by
     default as in a run on all cores of this machine.
-    StoreError if cases are missing, if two directories differ on a case, or if they are not of one campaign.
+    UsageError if cases are missing or the directories are not of one campaign; StoreError if two differ on a case.
     """
     stores = [open_store(folder) for folder in folders]
     _check_one_campaign(stores)
@@ -109,7 +109,7 @@ def _check_one_campaign(stores: Sequence[Store]) -> None:
 
     for store in stores:
         if identity(store) != identity(stores[0]):
-            raise StoreError(
+            raise UsageError(
                 f"{store.path}: is not of the campaign of {stores[0].path}: another file, seed, number of cases, "
                 "or other sources"
             )
@@ -123,7 +123,7 @@ def _check_parts(stores: Sequence[Store]) -> None:
 
 
 def _check_nothing_missing(stores: Sequence[Store]) -> None:
-    """StoreError that names the command for every range of cases that no directory holds."""
+    """UsageError that names the command for every range of cases that no directory holds."""
     missing = gaps([piece for store in stores for piece in store.committed()], range(stores[0].n_cases))
     if not missing:
         return
@@ -132,7 +132,7 @@ def _check_nothing_missing(stores: Sequence[Store]) -> None:
     lines = [f"`{command}`" for command, there in zip(commands.values(), unfinished, strict=True) if there]
     lines += _commands_of_absent(stores, missing)
     cases = ", ".join(f"{first} to {stop - 1}" for first, stop in missing)
-    raise StoreError(f"cases {cases} are missing; fly them with " + ", ".join(lines))
+    raise UsageError(f"cases {cases} are missing; fly them with " + ", ".join(lines))
 
 
 def _within(missing: Sequence[tuple[int, int]], expected: range) -> bool:

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from mc_engine.durable_file import disk_errors, is_temporary, make_folder, read_file, sync_folder, write_durably
-from mc_engine.errors import EngineError, StoreError
+from mc_engine.errors import EngineError, StoreError, UsageError
 from mc_engine.extras import how_to_install
 from mc_engine.shell_words import shell_word
 from mc_engine.store.counted_files import CountedFiles
@@ -52,11 +52,11 @@ def publish(run: Path, url: str, trusting: bool = False) -> Publication:
     """Copy the run in directory `run` to `url`; on return every file is listed there and was read back.
 
     trusting : compare only the size of files that the journal there records with the same digest; for repeated copies.
-    Parts there that the journal no longer records are removed.  StoreError if the store cannot be reached, or holds
-    anything but an earlier state of this run; EngineError if `url` is incomplete.
+    Parts there that the journal no longer records are removed.  StoreError if the store cannot be reached; UsageError
+    if it holds anything but an earlier state of this run; EngineError if `url` is incomplete.
     """
     if not is_run_directory(run):
-        raise StoreError(f"{run}: is no run directory")
+        raise UsageError(f"{run}: is no run directory")
     journal = _sound(scan(read_journal(run / JOURNAL)), run / JOURNAL)
     counted = _counted(journal.entries)
     derived = derived_files(run)
@@ -92,11 +92,11 @@ def fetch(url: str, folder: Path) -> Path:
     """Copy the run at `url` to the new directory `folder`, with its reports; the checksum of every part is verified.
 
     The copy is made under a temporary name, so that one that fails leaves no `folder`.  The next `fetch` removes what a
-    killed one left.  StoreError while another process copies to the same folder.
+    killed one left.  UsageError if `folder` is not empty or the URL holds no run.
     """
     url = store_url(url)
     if folder.exists() and any(folder.iterdir()):
-        raise StoreError(f"{folder}: is not empty; choose another folder")
+        raise UsageError(f"{folder}: is not empty; choose another folder")
     with _scratch(folder) as scratch:
         _copy(url, scratch)
         with disk_errors(folder):
@@ -139,7 +139,7 @@ def _copy(url: str, folder: Path) -> None:
         remote = _Remote(url)
         journal = remote.journal()
         if journal is None:
-            raise StoreError(f"{url}: holds no run")
+            raise UsageError(f"{url}: holds no run")
         counted = _counted(journal.entries)
         others = [name for name in remote.sizes if name not in counted and name != JOURNAL and not is_part_file(name)]
         for name in [*counted, *others]:
@@ -196,11 +196,11 @@ def _refuse_another_run(remote: "_Remote", before: Scan | None, journal: Scan, o
     if before is not None:
         theirs = before.entries[0]
         if (theirs.at, theirs.facts) != (journal.entries[0].at, journal.entries[0].facts):
-            raise StoreError(f"{remote.url}: holds another run; choose another place")
+            raise UsageError(f"{remote.url}: holds another run; choose another place")
         if before.length > journal.length:
-            raise StoreError(f"{remote.url}: holds a later state of this run; fetch that one")
+            raise UsageError(f"{remote.url}: holds a later state of this run; fetch that one")
     elif foreign := sorted(set(remote.sizes) - ours):
-        raise StoreError(f"{remote.url}: holds {foreign[0]} and no run; choose another place")
+        raise UsageError(f"{remote.url}: holds {foreign[0]} and no run; choose another place")
 
 
 def _write_fetched(folder: Path, name: str, content: bytes, url: str) -> None:
@@ -263,7 +263,7 @@ def _reaching(url: str) -> Iterator[None]:
     except EngineError:
         raise
     except ImportError as error:
-        raise StoreError(f"{url}: needs a package: {error}; {how_to_install('cloud')}") from error
+        raise UsageError(f"{url}: needs a package: {error}; {how_to_install('cloud')}") from error
     except Exception as error:  # each store's package has its own errors
         raise StoreError(f"{url}: {type(error).__name__}: {error}") from error
 

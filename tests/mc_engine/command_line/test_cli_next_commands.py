@@ -7,6 +7,7 @@ import shutil
 import sys
 from pathlib import Path
 
+import cart
 import pytest
 from cart import CAMPAIGN, MODEL, call, fails_with, small_store
 
@@ -47,6 +48,39 @@ def test_a_slip_is_answered_with_what_is_there_or_the_next_command(here):
         (["plan", "--share", "2", "--confidence", "0.9"], "--share is 2; it must be above 0 and below 1"),
     ]:
         fails_with(2, call(*words), said)
+
+
+def test_what_cannot_be_asked_of_sound_folders_and_urls_is_wrong_usage_and_no_damage(here, monkeypatch):
+    pytest.importorskip("fsspec")
+    small_store(here / "a")
+    small_store(here / "other", cases=50)
+    small_store(here / "begun", fly=False)
+    monkeypatch.setitem(cart.MANIFEST, "imported", {"file": "results.csv"})
+    small_store(here / "imported")
+    (here / "folder.html").mkdir()
+    url = f"file://{here}"
+    assert call("publish", "other", f"{url}/copy").exit_code == 0
+    for words, said in [
+        (["publish", "a", f"{url}/copy"], "holds another run; choose another place"),
+        (["publish", "a", f"{url}/cart"], "holds model.py and no run; choose another place"),
+        (["fetch", f"{url}/cart", "new"], "cart: holds no run"),
+        (["status", f"{url}/nowhere"], "nowhere: holds no run"),
+        (["fetch", f"{url}/copy", "a"], "a: is not empty; choose another folder"),
+        (["merge", "whole", "a", "other"], "other: is not of the campaign of a"),
+        (["merge", "whole", "begun"], "cases 0 to 39 are missing; fly them with `mc-engine resume begun`"),
+        *(
+            ([verb, *words], "imported: its results were imported from results.csv")
+            for verb, *words in (["resume", "imported"], ["resume", "imported", "--repair"], ["replay", "imported", 3],
+                                 ["extend", "imported", "--cases", 50], ["merge", "whole", "imported"])
+        ),
+        (["compare", "a", "other", "--report", "none/c.html"], "--report none/c.html: there is no folder none"),
+        (["compare", "a", "other", "--report", "folder.html"], "--report folder.html: is a folder; name a file"),
+        (["export", "a", "--out", "folder.html"], "--out folder.html: is a folder; name a file"),
+    ]:  # fmt: skip
+        answer = call(*words)
+        fails_with(2, answer, said)
+        assert not answer.stdout
+    assert not (here / "whole").exists()
 
 
 def test_a_run_that_is_complete_is_not_flown_again(here):

@@ -207,7 +207,7 @@ def test_results_of_other_inputs_are_refused(tmp_path, flown):
 @pytest.mark.parametrize(
     ("table", "row", "change", "sentence"),
     [
-        ("results", 3, {"case_id": -2}, r"case_id: row 4: -2 is no case of the campaign; it has the cases 0 to 99, and -1"),
+        ("results", 3, {"case_id": -2}, "row 4: -2 is no case of the campaign; it has the cases 0 to 99, and -1"),
         ("results", 3, {"case_id": 2}, "case_id: case 3 is missing"),
         ("results", 101, {"case_id": -2}, "case_id: row 102: -2 is no case of the campaign"),
         ("results", 101, {"case_id": 2}, "case_id: case 2 is there twice; remove one of its rows"),
