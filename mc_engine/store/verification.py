@@ -133,7 +133,7 @@ def _run_damages(run: Path) -> tuple[list[Damage], Collection[str]]:
     problems += _part_problems(run, counted, manifest)
     problems += _obstacles(run)
     if not busy:
-        problems += _unrecorded(run, present, counted, remedy)
+        problems += _unrecorded(run, present, counted, remedy) if begun else []
         problems += _unfinished(journal, counted, manifest, remedy)
         problems += _companion_problems(run, journal)
     if killed:
@@ -244,6 +244,6 @@ def _line_problems(journal: Scan, wrong: dict[int, str], busy: bool, remedy: str
     lines = {number: "" for number in journal.damaged} | {number: f", {why}" for number, why in wrong.items()}
     for number, why in sorted(lines.items()):
         yield Damage(f"{JOURNAL}, line {number}: damaged{why}", REPAIR if number > 1 else ORIGINAL)
-    if journal.torn and not busy:
-        last = len(journal.entries) + len(journal.damaged) + 1
+    last = len(journal.entries) + len(journal.damaged) + 1
+    if journal.torn and not busy and last > 1:  # without a first line the creation is lost, which is said of it
         yield Damage(f"{JOURNAL}, line {last}: torn; the next writer cuts it off", remedy)

@@ -33,6 +33,16 @@ def test_verify_reports_all_damage_at_once(store):
     assert "part-0000000000-0000000009.parquet: has no line" in text
 
 
+@pytest.mark.parametrize("left", [b"", b'{"torn'], ids=["empty", "torn first line"])
+def test_without_the_first_line_of_a_journal_the_one_remedy_is_its_original(store, left):
+    everything(store)
+    (store.path / "journal.jsonl").write_bytes(left)
+    problems = verification.damages(store.path)
+    [remedy] = verification.remedies("runs/x", problems)
+    assert remedy.startswith("put back the original of journal.jsonl, or fetch a copy of the run; without it no repair")
+    assert [problem.file for problem in problems] == ["journal.jsonl"]
+
+
 def test_verify_names_a_part_that_is_gone(store):
     filled(store)
     path = store.path / "cases" / parts.part_name(10, 10)
