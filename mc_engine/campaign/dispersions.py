@@ -114,10 +114,13 @@ def _check_keys_fit(spec: Mapping[str, Any], design: str, context: DispersionCon
 
 def _check_level_keys(spec: Mapping[str, Any], findings: Findings) -> None:
     """Note keys that say nothing of the levels of an axis."""
-    if spec.get("dist") == "constant":
+    dist = spec.get("dist")
+    if dist == "constant":
         for key in [key for key in ("levels", "values") if key in spec]:
             findings.add(key, "belongs to an axis of several levels; a constant has one, its value")
-    elif "dist" not in spec and "values" in spec:
+    elif dist not in (None, "discrete") and "values" in spec:
+        findings.add("values", f'do not go with dist = "{dist}"; leave one of the two out')
+    elif dist is None and "values" in spec:
         for key in [key for key in ("mean", "half_range", "three_sigma", "lower", "upper") if key in spec]:
             findings.add(key, "belongs to levels = n; values already say it all")
 

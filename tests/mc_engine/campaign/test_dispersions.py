@@ -123,6 +123,8 @@ MISTAKES_OF_AXES = [
     ("values = [true]", "values 1", "true is not a number; height_km is Height [km]"),
     *((f"values = [1, 2]\n{key} = 1", key, "belongs to levels = n; values already say it all")
       for key in ("mean", "half_range", "three_sigma", "lower", "upper")),
+    *((f"{body}\nvalues = [1, 2]", "values", f"do not go with {body.splitlines()[0]}; leave one of the two out")
+      for body in ('dist = "normal"\nsigma = 1', 'dist = "uniform"\nhalf_range = 1')),
     *((f'dist = "constant"\nvalue = 1\n{line}', line.split()[0],
        "belongs to an axis of several levels; a constant has one, its value")
       for line in ("levels = 3", "values = [2, 3]")),
