@@ -13,19 +13,25 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.campaign.orbit_messages import AXES, MessageFault, UncertainState, read_message, same_epoch
+from mc_engine.campaign.orbit_messages import AXES, NO_EPOCH, MessageFault, UncertainState, moment_of, read_message
 from mc_engine.campaign.reading import Findings, read, shown
 from mc_engine.campaign.sections import CovarianceSection
 from mc_engine.model.files import FileFault, open_beside, resolve_beside
+from mc_engine.sampling.designs import RANDOM
+from mc_engine.suggestions import listed
 
 _MOST_OF_MESSAGE = 2**26  # bytes
+_WITHOUT_NORMALS = ("grid", "table")  # designs whose values come from levels or a file
 _UNITS = ("km", "km", "km", "km/s", "km/s", "km/s")
 _LEAST_EIGENVALUE = 1e-8  # of the matrix of correlations: below it, it is singular for the digits of a message
 
 
-def spread_covariances(document: dict[str, Any], directory: Path, findings: Findings) -> tuple[str, ...]:
+def spread_covariances(
+    document: dict[str, Any], directory: Path, design: str | None, findings: Findings
+) -> tuple[str, ...]:
     """Put the dispersions and correlations of every [covariance.NAME] into the document.
 
+    design : that of the campaign, None where it is unknown.
     Returns the files that were read, by their names in `directory`.
     """
     written = document.get("covariance", {})
@@ -41,12 +47,15 @@ def spread_covariances(document: dict[str, Any], directory: Path, findings: Find
         files.append(section.file)
         matrix = _matrix(section, directory, section_findings)
         if matrix is not None:
-            _add_dispersions(document, section, matrix, section_findings)
+            _add_dispersions(document, section, matrix, design, section_findings)
     return tuple(files)
 
 
 def _matrix(section: CovarianceSection, directory: Path, findings: Findings) -> np.ndarray | None:
     """The covariance in the axes asked for, or None with what is wrong noted."""
+    if section.epoch is not None and moment_of(section.epoch) is None:
+        findings.add("epoch", f"{shown(section.epoch)} {NO_EPOCH}")
+        return None
     try:
         with open_beside(resolve_beside(directory, section.file), _MOST_OF_MESSAGE) as file:
             text = file.read().decode()
@@ -75,7 +84,7 @@ def _chosen(states: list[UncertainState], section: CovarianceSection) -> Uncerta
         if len(states) > 1:
             raise MessageFault(f'has {len(states)} covariances; say which with epoch = "{states[0].epoch}"')
         return states[0]
-    chosen = [state for state in states if same_epoch(state.epoch, section.epoch)]
+    chosen = [state for state in states if moment_of(state.epoch) == moment_of(section.epoch)]
     if not chosen:
         raise MessageFault(
             f"has no covariance at {section.epoch}; it has {', '.join(state.epoch for state in states[:5])}"
@@ -84,18 +93,24 @@ def _chosen(states: list[UncertainState], section: CovarianceSection) -> Uncerta
 
 
 def _add_dispersions(
-    document: dict[str, Any], section: CovarianceSection, matrix: np.ndarray, findings: Findings
+    document: dict[str, Any], section: CovarianceSection, matrix: np.ndarray, design: str | None, findings: Findings
 ) -> None:
     dispersions, correlations = document.setdefault("dispersion", {}), document.setdefault("correlation", [])
     if not isinstance(dispersions, dict) or not isinstance(correlations, list):
         return  # which the reader of those sections says
     source = section.source or f"{section.file}, {section.frame} axes"
+    ranks = list(_rank_correlations(section.parameters, matrix, source))
+    if design in _WITHOUT_NORMALS or (ranks and design not in (None, *RANDOM)):
+        findings.add("", f'the design "{design}" takes no covariance; covariances are for {listed(RANDOM)}')
+        ranks = []
+    if design in _WITHOUT_NORMALS:
+        return
     for name, sigma, unit in zip(section.parameters, np.sqrt(np.diag(matrix)), _UNITS, strict=True):
         if name in dispersions:
             findings.add("parameters", f'"{name}" has a dispersion already; leave one of the two out')
             continue
         dispersions[name] = {"dist": "normal", "sigma": float(sigma), "unit": unit, "source": source}
-    correlations.extend(_rank_correlations(section.parameters, matrix, source))
+    correlations.extend(ranks)
 
 
 def _rank_correlations(names: list[str], matrix: np.ndarray, source: str) -> Iterator[dict[str, Any]]:

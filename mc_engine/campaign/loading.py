@@ -169,7 +169,7 @@ def _assemble(
     findings: Findings,
 ) -> Campaign | None:
     """The campaign, or None where a section or the model is missing, without which the rest cannot be checked."""
-    messages = spread_covariances(document, directory, findings)
+    messages = spread_covariances(document, directory, _named_design(document), findings)
     sections = read_sections(document, findings)
     model = system_of(document, sections.program, directory, findings)
     if model is None:

@@ -17,6 +17,7 @@ from mc_engine.numbers_in_text import is_real
 
 AXES = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
 LOCAL = ("RTN", "TNW")
+NO_EPOCH = "is not an epoch such as 2026-01-31T12:00:00"
 _REPEATED = "MAN_"  # how the keywords of an OPM begin that each of its manoeuvres has again
 _SAME = {"RSW": "RTN", "RIC": "RTN"}  # other names of the same axes
 _ENTRIES = tuple((f"C{row}_{column}", i, j) for i, row in enumerate(AXES) for j, column in enumerate(AXES[: i + 1]))
@@ -169,16 +170,19 @@ def _finite_number(line: int, text: str) -> float:
 
 
 def _moment(line: int, text: str) -> datetime:
-    """An epoch, calendar date or day of the year, for comparison within one message only."""
+    """An epoch, for comparison within one message only; MessageFault with the line if it is none."""
+    moment = moment_of(text)
+    if moment is None:
+        raise MessageFault(f'line {line}: "{text}" {NO_EPOCH}')
+    return moment
+
+
+def moment_of(text: str) -> datetime | None:
+    """An epoch, calendar date or day of the year; None if the text is none."""
     plain = text.rstrip("Z")
     for form in ("%Y-%m-%dT%H:%M:%S.%f", "%Y-%m-%dT%H:%M:%S", "%Y-%jT%H:%M:%S.%f", "%Y-%jT%H:%M:%S"):
         try:
             return datetime.strptime(plain, form)
         except ValueError:
             continue
-    raise MessageFault(f'line {line}: "{text}" is not an epoch such as 2026-01-31T12:00:00')
-
-
-def same_epoch(a: str, b: str) -> bool:
-    """Whether two epochs, as text, are the same; MessageFault if one is none."""
-    return _moment(0, a) == _moment(0, b)
+    return None

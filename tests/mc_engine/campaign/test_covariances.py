@@ -193,6 +193,46 @@ def test_a_mistake_in_the_campaign_file_is_named(folder):
             load_campaign(folder)
 
 
+def only_problem(folder, text):
+    """The place and the sentence of the one problem of a campaign file."""
+    (folder / "campaign.toml").write_text(text)
+    with pytest.raises(CampaignError) as error:
+        load_campaign(folder)
+    [problem] = error.value.problems
+    return problem.place, problem.message
+
+
+def test_an_epoch_that_is_none_is_named_where_it_is_written(folder):
+    place, message = only_problem(folder, f'{CAMPAIGN}epoch = "tomorrow"\n')
+    assert (place, message) == (
+        "covariance.launch.epoch",
+        '"tomorrow" is not an epoch such as 2026-01-31T12:00:00',
+    )
+
+
+@pytest.mark.parametrize("design", ["grid", "one_at_a_time", "table", "saltelli"])
+def test_a_design_that_cannot_have_a_covariance_is_named_with_the_covariance(folder, design):
+    (folder / "cases.csv").write_text("dx_m\n1.0\n")
+    table = '\ntable = "cases.csv"' if design == "table" else ""
+    cases = "cases = 24" if design == "saltelli" else ""
+    text = CAMPAIGN.replace('"mc"', f'"{design}"{table}').replace("cases = 20", cases)
+    place, message = only_problem(folder, text)
+    assert place == "covariance.launch"
+    assert message == f'the design "{design}" takes no covariance; covariances are for "mc", "lhs", "sobol"'
+
+
+def test_a_covariance_without_correlations_goes_with_one_input_at_a_time(folder):
+    apart = "\n".join(
+        line
+        if line.split(" = ")[0] not in {f"C{a}_{b}" for i, a in enumerate(AXES) for b in AXES[:i]}
+        else f"{line.split(' = ')[0]} = 0.0"
+        for line in opm().split("\n")
+    )
+    (folder / "state.opm").write_text(apart)
+    (folder / "campaign.toml").write_text(CAMPAIGN.replace('"mc"', '"one_at_a_time"').replace("cases = 20", ""))
+    assert load_campaign(folder).cases == 13
+
+
 def test_a_message_that_cannot_be_used_is_refused_with_a_sentence(folder):
     for text, message in [
         ("", "no orbit message"),
