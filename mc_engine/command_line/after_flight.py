@@ -23,6 +23,7 @@ from mc_engine.command_line.app import (
     run_at,
     write_reports,
 )
+from mc_engine.command_line.next_step import MERGE
 from mc_engine.interruption import advise
 from mc_engine.shell_words import shell_word
 from mc_engine.store.urls import is_url, store_url
@@ -106,6 +107,9 @@ def status(place: RunPlace) -> None:
     typer.echo(f"cases     {case_line(store)}")
     if imported := store.manifest.get("imported"):
         typer.echo(f"imported  from {imported['file']}; the engine did not fly these cases")
+    if shard := store.manifest.get("shard"):
+        cases = [(shard["first"], shard["stop"])] * (shard["first"] < shard["stop"])
+        typer.echo(f"shard     {shard['number']} of {shard['of']}, cases {ranges(cases)}")
     writer = holder(folder)
     missing = store.missing()
     if writer is not None:
@@ -115,7 +119,7 @@ def status(place: RunPlace) -> None:
     elif lost := store.lost_files():
         leave(DAMAGED, f"{place}/{lost[0]}: is gone; `mc-engine verify {shell_word(place)}` names all damage")
     else:
-        typer.echo("complete")
+        typer.echo(f"complete; {MERGE}" if shard else "complete")
 
 
 @app.command()

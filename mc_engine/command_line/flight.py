@@ -34,7 +34,7 @@ from mc_engine.command_line.app import (
     run_here,
     write_reports,
 )
-from mc_engine.command_line.next_step import after_flight, is_complete
+from mc_engine.command_line.next_step import MERGE, after_flight, is_complete
 from mc_engine.interruption import advise, raise_if_signalled
 from mc_engine.shell_words import shell_word
 from mc_engine.status import MOST_CASES
@@ -247,7 +247,7 @@ def _finish_shard(store: "Store", max_failed: int | None) -> None:
     counts = store.status_counts()
     typer.echo(f"shard        {store.path}")
     typer.echo(f"cases        {ranges(store.committed())}: " + ", ".join(f"{n:,} {word}" for word, n in counts.items()))
-    typer.echo("next         `mc-engine merge RUN SHARD...` makes one run of all shards, and its reports")
+    typer.echo(f"next         {MERGE}")
     _judge_failures(failed_cases(store), max_failed)
 
 
@@ -305,7 +305,7 @@ def _leave_complete(store: "Store", url: str | None) -> None:
         more = ""
     next_step = f"{more}`mc-engine report {named}` writes the reports anew"
     if store.manifest.get("shard"):
-        next_step = "`mc-engine merge RUN SHARD...` makes one run of all shards, and its reports"
+        next_step = MERGE
     typer.echo(f"{folder}: is complete; {next_step}")
     if url is not None:
         echo_publication(folder, url)

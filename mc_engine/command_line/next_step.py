@@ -9,6 +9,7 @@ from mc_engine.interruption import NOTHING_BEGUN
 from mc_engine.shell_words import shell_word
 from mc_engine.store.run_files import JOURNAL, MANIFEST
 
+MERGE = "`mc-engine merge RUN SHARD...` makes one run of all shards, and its reports"
 _UNFINISHED = ("created", "started", "rerun", "extended", "part-withdrawn")  # events that `finished` has to follow
 
 

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 CHANGED = 1  # the exit status of `compare`
 _SECONDS_BETWEEN_LINES = 5.0
 _REPEATS = 20
+_FEWEST_OF_LEVEL = 500  # cases, which both methods need
 
 
 @app.command("import")
@@ -126,7 +127,7 @@ def rare(
         str, typer.Option(help="subset or cross-entropy.", autocompletion=beginning(("subset", "cross-entropy")))
     ] = "subset",
     cases_per_level: Annotated[
-        int, typer.Option(min=1, max=10_000_000, help="Cases that each level stands on.")
+        int, typer.Option(min=_FEWEST_OF_LEVEL, max=10_000_000, help="Cases that each level stands on.")
     ] = 10_000,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed, in place of the file's.")] = None,
     out: Annotated[

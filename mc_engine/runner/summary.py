@@ -114,7 +114,7 @@ def analyses_line(store: Store) -> str:
     looks = store.manifest.get("looks", [])
     begun = store.manifest["campaign"]["cases"]
     if (flown := _flown(store)) < store.n_cases and not looks:
-        history = f"interrupted after {flown:,} of {store.n_cases:,} cases"
+        history = f"{flown:,} of {store.n_cases:,} cases so far"
     elif looks:
         scheduled = sum(look <= store.n_cases for look in looks)
         analyses = f"{scheduled} interim {'analysis' if scheduled == 1 else 'analyses'}"

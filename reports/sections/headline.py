@@ -186,7 +186,7 @@ def _how_looked_at(flown: Flown) -> str:
         )
         story += f"it ended after {flown_so_far}."
     elif flown.n_tried < flown.n_wanted:
-        story = f"The run was interrupted after {count(flown.n_tried)} of {flown_so_far} cases."
+        story = f"The run has {count(flown.n_tried)} of {flown_so_far} cases so far."
     else:
         begun = count(int(flown.campaign.get("cases", 0)))
         story = f"The run began with {begun} cases and was extended to {flown_so_far} after their results were known."

@@ -104,6 +104,9 @@ def test_a_complete_run_that_cannot_be_extended_is_not_said_to_be(here):
 def test_a_complete_shard_is_to_be_merged(here):
     flight = ("run", "minimal", "--cases", "20", "--no-report", "--shard")
     assert call(*flight, "1/2", "--out", "part").exit_code == 0
+    said = call("status", "part").stdout
+    assert "\nshard     1 of 2, cases 0 to 9\n" in said
+    assert said.endswith("\ncomplete; `mc-engine merge RUN SHARD...` makes one run of all shards, and its reports\n")
     answer = call("resume", "part").stdout
     assert answer.startswith("part: is complete; `mc-engine merge RUN SHARD...` makes one run")
     assert "extend" not in answer

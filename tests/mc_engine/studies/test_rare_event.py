@@ -1,6 +1,7 @@
 """Rare events of campaigns: against plain cases and a closed form, from the command line, and what is refused."""
 
 import math
+import re
 import signal
 from dataclasses import replace
 
@@ -20,7 +21,7 @@ from mc_engine.sampling.correlation import normal_correlation
 from mc_engine.sampling.distributions import Discrete, Empirical, Normal
 from mc_engine.section import ReportSection
 from mc_engine.studies.limit_state import LimitState, chosen_requirement
-from mc_engine.studies.rare_event import estimate_rare_event
+from mc_engine.studies.rare_event import METHODS, estimate_rare_event
 from mc_engine.studies.rare_event_folder import open_rare_event, probability_words, rare_event_lines
 
 MINIMAL = SHIPPED / "minimal"
@@ -175,6 +176,17 @@ def test_the_command_line_says_probability_interval_cost_and_failures(tmp_path):
     status = CliRunner().invoke(app, ["status", str(tmp_path / "out")])
     assert "requirement  apogee: apogee_altitude_km at least 600 km" in status.output
     assert CliRunner().invoke(app, ["verify", str(tmp_path / "out")]).exit_code == 0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_help_names_the_fewest_cases_of_a_level_that_are_accepted(tmp_path, method):
+    least = int(re.search(r"(\d+)<=x<=10000000", command("--help").output).group(1))
+    with pytest.raises(CampaignError, match=f"{least - 1} cases per level are too few; {least} are the least"):
+        estimate_rare_event(minimal(), out=tmp_path / "out", method=method, cases_per_level=least - 1, workers=1)
+    options = ("--method", method, "--out", tmp_path / "out")
+    refused = command(MINIMAL, "--cases-per-level", least - 1, *options)
+    assert refused.exit_code == 2
+    assert "preparing" not in refused.output
 
 
 def test_an_interruption_is_a_sentence_and_stores_nothing(tmp_path):

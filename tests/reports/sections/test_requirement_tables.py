@@ -70,14 +70,14 @@ def test_a_run_extended_by_hand_says_so():
     assert "extended" not in " ".join(warnings(flown(campaign=mc())))
 
 
-def test_an_interrupted_run_has_the_bounds_that_hold_at_every_number_of_cases():
+def test_a_run_that_is_not_complete_has_the_bounds_that_hold_at_every_number_of_cases():
     run = synthetic_run(1000, 0, requirements=[FUEL], campaign=mc(2000))
     run.wanted = 2000
     cut = Flown(run, "run")
     assert cut.verdicts[0].looked
     assert "Robbins" in requirement_table(cut).note
     warned = " ".join(warnings(cut)).replace("\u202f", " ")
-    assert "interrupted after 1 000 of 2 000 cases. The bounds on probabilities hold at every number" in warned
+    assert "The run has 1 000 of 2 000 cases so far. The bounds on probabilities hold at every number" in warned
 
 
 def test_a_nominal_case_that_failed_is_told():
