@@ -8,7 +8,7 @@ import numpy as np
 
 from reports.document.blocks import Cell, Column, Table
 from reports.drawing import lettering
-from reports.drawing.lettering import TYPE
+from reports.drawing.lettering import BOLD, TYPE
 
 ROOM = 490.0  # points that a table has
 INSET = 7.0  # of a column, both sides together
@@ -23,7 +23,6 @@ _VALUE = re.compile(r"[^ ]+ ?")  # of a column of numbers: with its unit, such a
 _JOINED = re.compile(r"(?<=,) | (?=/ )|(?<=/) "), re.compile(r"(?<=,) |(?<=/) ")
 NO_BREAK = "\N{NO-BREAK SPACE}"
 COMMAND = 36  # letters of a command that is not broken
-BOLD = 1.15  # of the head
 SLACK = 1.06  # of a text over its lines: a line seldom ends at the edge
 
 

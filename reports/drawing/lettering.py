@@ -7,6 +7,7 @@ from xml.sax.saxutils import escape
 from reports.drawing.palette import INK
 
 TYPE, LINE = 7.5, 9.4  # size, and distance of lines
+BOLD = 1.15  # width of bold type over that of plain type
 # Advance widths of DejaVu Sans 2.37 in hundredths of the type size, from the space to the tilde.
 _WIDTHS = dict(zip(map(chr, range(32, 127)), (
     32, 40, 46, 84, 64, 95, 78, 27, 39, 39, 50, 84, 32, 36, 32, 34, 64, 64, 64, 64, 64, 64, 64, 64, 64, 64, 34, 34, 84,

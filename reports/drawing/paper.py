@@ -146,7 +146,7 @@ class _Panel:
 
     def __init__(self, plot: Plot, left: float, width: float):
         self.plot, self.left, self.right, self.height = plot, left, left + width, SHORT * plot.height
-        self.title = lettering.wrapped(plot.title, width - 4.0, 3)
+        self.title = lettering.wrapped(plot.title, (width - 4.0) / lettering.BOLD, 3)
         self.ends = plot.ends
         self.y_ticks = _ticks(plot.y, self.ends[1], self.height, True)
         self.y_label = _label(plot.y, self.y_ticks, self.height + 12.0)

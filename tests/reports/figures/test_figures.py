@@ -3,6 +3,7 @@
 import json
 import re
 from base64 import b64decode
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from synthetic_run import synthetic_run
 from mc_engine.model.figures import ScatterFigure, to_record
 from reports.contents import build
 from reports.document.blocks import FigureBlock, blocks_of
-from reports.drawing import paper, screen
+from reports.drawing import lettering, paper, screen
 from reports.drawing.marks import Axis, Drawing, Limit, Line, Plot, Points
 from reports.drawing.palette import INK
 from reports.drawing.strokes import Frame, stroked
@@ -48,6 +49,13 @@ def test_two_lengths_in_one_unit_are_to_scale_unless_the_cloud_is_much_longer_th
     ).drawing.plots
     assert (plot.equal, plot.title) == ((True, "") if to_scale else (False, "Each axis has a scale of its own"))
     assert ("scaleanchor" in screen.specifications(Drawing("", (plot,)))[0]["layout"]["yaxis"]) == to_scale
+
+
+def test_the_bold_line_of_a_panels_title_is_as_wide_as_the_panel_at_most():
+    title = "limits 1\u202f234\u202f467.890123 and 1\u202f234\u202f667.890123 beyond the axis"
+    panel = replace(PLOT, title=title)
+    (bold, *_) = re.findall('font-weight="bold">([^<]*)<', paper.svg(Drawing("", (panel, panel), 2)))
+    assert lettering.BOLD * lettering.width(bold) <= 0.5 * (paper.WIDTH - paper.GAP)
 
 
 @pytest.mark.parametrize(("units", "lengths"), [(("km", "km"), True), (("km", "m"), False), (("deg", "deg"), False)])

@@ -53,6 +53,28 @@ def test_a_small_text_is_below_the_number_with_its_unit_and_neither_is_broken(pd
     assert re.search(r"  for 99\.73[\u202f ]% with", text)
 
 
+def test_limits_of_many_digits_leave_the_names_of_requirements_their_room():
+    run = synthetic_run(300, failed=0)
+    force = {**run.manifest["requirements"][1], "name": "momentum_at_separation", "at_most": 1234567.890123}
+    run.manifest["requirements"] = [force, {**force, "at_least": -1234567.890123}]
+    run.table["peak_force_n"] += 1e6
+    document = build(run, "run")
+    own = replace(
+        document, sections=(Section("own", "Own", (next(blocks_of(document, Table)),)),), verdicts=(), costs=()
+    )
+    pages = [page.get_textpage() for page in pypdfium2.PdfDocument(render_pdf(own))]
+
+    def ends(text):
+        """Left and right end of every place where a text is in one line."""
+        for page in pages:
+            search = page.search(text)
+            while found := search.get_next():
+                yield page.get_charbox(found[0])[0], page.get_charbox(sum(found) - 1)[2]
+
+    (_, name_ends), (limit_begins, _) = next(ends("separation")), next(ends("at most 1"))
+    assert name_ends < limit_begins
+
+
 def test_two_readers_open_it_and_see_the_same_pages_with_ink_on_each(pdf):
     pages = pypdf.PdfReader(io.BytesIO(pdf)).pages
     drawn = pypdfium2.PdfDocument(pdf)
