@@ -4,11 +4,13 @@ Python itself would also accept 1_0, digits of other scripts, nan and infinity.
 """
 
 import re
-from decimal import Decimal
+from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
+from math import floor, log10
 
 LARGEST_WHOLE = 2**63 - 1
 LEAST_SHARE = 1e-12  # and 1 less it is the most: beyond, 1 - share has too few digits
 
+_SLACK = Decimal("1e-6")  # of a last digit: a number nearer to a printed one differs from it by rounding alone
 _GIVEN_DIGITS = 14  # of a share that is printed as it was given; a double's last ones are rounding
 
 _WHOLE = re.compile(r"[+-]?[0-9]{1,30}")
@@ -28,3 +30,15 @@ def is_real(text: str) -> bool:
 def percent_digits(share: float) -> str:
     """A share that somebody gave, in percent with all its digits: 99.996833 for 0.99996833."""
     return f"{(Decimal(f'{share:.{_GIVEN_DIGITS}g}') * 100).normalize():f}"
+
+
+def outward(value: float, decimals: int, up: bool) -> float:
+    """`value` to so many decimals, rounded up or down: what is printed of a bound claims no more than was shown."""
+    scaled = Decimal(repr(float(value))).scaleb(decimals)
+    whole = (scaled - _SLACK if up else scaled + _SLACK).to_integral_value(ROUND_CEILING if up else ROUND_FLOOR)
+    return float(whole.scaleb(-decimals)) + 0.0  # not -0
+
+
+def decimals_of(value: float, digits: int) -> int:
+    """The decimals with which a finite number has so many significant digits; negative for large numbers."""
+    return digits - 1 - floor(log10(abs(value))) if value else 0

@@ -6,7 +6,7 @@ from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, Any
 
 from mc_engine.errors import StoreError
-from mc_engine.numbers_in_text import percent_digits
+from mc_engine.numbers_in_text import decimals_of, outward, percent_digits
 from mc_engine.section import ReportSection
 from mc_engine.shell_words import shell_word
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
@@ -230,12 +230,16 @@ def summary_lines(metric: str, summary: "Summary", unit: str, random: bool) -> l
     if summary.n_used == 0:
         return [head]
     sd = "-" if summary.sd is None else f"{summary.sd:.6g}"
-    told = f"{{:.{_digits(summary)}g}}".format
+    digits = _digits(summary)
+    told = f"{{:.{digits}g}}".format
+
+    def bound(value: float | None, up: bool) -> str:
+        return "too few cases" if value is None else told(outward(value, decimals_of(value, digits), up))
+
     moments = f"mean {told(summary.mean)}, sd {sd}, " if random or summary.quantiles else ""
     lines = [head, f"  {moments}from {told(summary.minimum)} to {told(summary.maximum)}"]
     for item in summary.quantiles:
-        limits = [told(limit) if limit is not None else "too few cases" for limit in (item.lower, item.upper)]
-        interval = f"  [{', '.join(limits)}]" if random else ""
+        interval = f"  [{bound(item.lower, False)}, {bound(item.upper, True)}]" if random else ""
         lines.append(f"  {100.0 * item.probability:>7.3f} %  {told(item.value)}{interval}")
     return lines
 

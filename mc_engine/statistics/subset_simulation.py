@@ -98,7 +98,7 @@ def subset_simulation(
         upper = interval_of_mean(climb.reached, confidence)[1]
     mean = float(estimates.mean())
     error = float(estimates.std(ddof=1)) / (mean * math.sqrt(RUNS)) if mean > 0.0 else math.inf
-    remarks = tuple(_remarks(climb, estimates, upper))
+    remarks = tuple(_remarks(climb, estimates))
     cases = flights.evaluated(climb.weight)
     return RareEvent("subset", mean, lower, upper, confidence, error, climb.levels, cases, remarks)
 
@@ -191,12 +191,12 @@ def _shared_out(seeds: Members, per_run: int) -> tuple[Members, np.ndarray]:
     return seeds, per_run // each + (place < per_run % each)
 
 
-def _remarks(climb: Climb, estimates: np.ndarray, upper: float) -> list[str]:
+def _remarks(climb: Climb, estimates: np.ndarray) -> list[str]:
     remarks, levels = [], climb.levels
     if not estimates.any():
         remarks.append(
-            f"No case failed in {len(levels)} levels: the probability is smaller than {upper:.2g}, and that is all "
-            "that is shown."
+            f"No case failed in {len(levels)} levels: the probability is below the upper bound, and that is all that "
+            "is shown."
         )
     elif not estimates.all():
         remarks.append(

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.parts import Requirement
+from mc_engine.numbers_in_text import outward
 from mc_engine.statistics.binomial import (
     acceptance_number,
     half_rate_share,
@@ -47,7 +48,8 @@ def table_lines(rows: Sequence[PlanRow], share: float, confidence: float) -> Ite
     yield f"{heading}  passes at half the failures"
     for row in rows:
         anytime = smallest_at_any_time(share, confidence, row.failures)
-        yield f"{row.failures:>8}  {row.cases:>9}  {anytime:>13}  {row.shown:>18.6f}  {100.0 * row.half_rate:.1f} %"
+        shown = outward(row.shown, 6, up=False)
+        yield f"{row.failures:>8}  {row.cases:>9}  {anytime:>13}  {shown:>18.6f}  {100.0 * row.half_rate:.1f} %"
 
 
 def interval_lines(share: float, confidence: float) -> Iterator[str]:

@@ -7,11 +7,10 @@ The journal holds the checksums of the other files; see `store.result_folder`.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mc_engine.numbers_in_text import percent_digits
+from mc_engine.numbers_in_text import decimals_of, outward, percent_digits
 from mc_engine.store.result_folder import read_result
 from mc_engine.store.run_files import RARE_EVENT
 
@@ -78,9 +77,8 @@ def probability_words(result: dict[str, Any]) -> str:
 
 def printed_interval(result: dict[str, Any], digits: int = 3) -> tuple[float, float]:
     """Its ends in so many significant digits, each rounded outward: what is printed holds what was found."""
-    ends = zip((result["lower"], result["upper"]), (ROUND_FLOOR, ROUND_CEILING), strict=True)
-    lower, upper = (float(Context(digits, rounding).plus(Decimal(repr(float(end))))) for end, rounding in ends)
-    return lower, upper
+    lower, upper = result["lower"], result["upper"]
+    return outward(lower, decimals_of(lower, digits), False), outward(upper, decimals_of(upper, digits), True)
 
 
 def standing(result: dict[str, Any]) -> str:

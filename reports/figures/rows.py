@@ -29,7 +29,7 @@ def margin_figure(names: Sequence[str], margins: np.ndarray, tones: Sequence[str
     bound, worst = 100.0 * np.clip(margins.T, -MOST_MARGIN, MOST_MARGIN)
     known = np.flatnonzero(np.isfinite(bound)).tolist()
     words = [
-        ["none" if margin != margin else f"{number(100.0 * margin, 3)}{SPACE}%" for margin in row]
+        ["none" if margin != margin else f"{number(100.0 * margin, 3, up=False)}{SPACE}%" for margin in row]
         for row in margins.tolist()
     ]
     labels = [f"{name}, {row[0]}".removesuffix(", none") for name, row in zip(names, words, strict=True)]

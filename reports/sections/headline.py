@@ -113,7 +113,7 @@ def _tails(flown: Flown, summary: Summary) -> Iterator[str]:
         quantile, upper = summary.at(probability), probability > 0.5
         bound = None if quantile is None else (quantile.upper if upper else quantile.lower)
         if quantile is not None and bound is not None:
-            value, edge = (number(end, 4, summary.spread) for end in (quantile.value, bound))
+            value, edge = number(quantile.value, 4, summary.spread), number(bound, 4, summary.spread, up=upper)
             side = "upper" if upper else "lower"
             yield f"{percentile(probability)} {value}, {each} {side} confidence bound {edge}"
 

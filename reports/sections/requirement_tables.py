@@ -71,7 +71,7 @@ def requirement_table(flown: Flown) -> Table:
     note = (
         "Margin: from the demonstrated bound (tolerance limit) to the nearest limit; in brackets, relative to the "
         "size of the limit, or to half the distance between two. Of two limits, the demonstrated bounds are both as "
-        "far inside, or outside, as the margin. "
+        "far inside, or outside, as the margin. Bounds and margins are rounded to the unfavourable side. "
         f"Demonstrated probability: observed fraction of the cases, in brackets {_bounds_named(flown)}. A failed case, "
         "or one whose metric is not a number, counts as outside."
     )
@@ -116,21 +116,24 @@ def _margin_cell(verdict: Verdict, unit: str) -> Cell:
     if verdict.margin is None:
         return Cell("–")
     limits = Limits(verdict.at_most, verdict.at_least)
-    share = f"({number(100.0 * verdict.margin / limits.reach, 3)}{SPACE}%)" if _has_width(limits) else ""
-    return Cell(with_unit(number(verdict.margin, 3), unit), verdict.margin, share)
+    share = f"({number(100.0 * verdict.margin / limits.reach, 3, up=False)}{SPACE}%)" if _has_width(limits) else ""
+    return Cell(with_unit(number(verdict.margin, 3, up=False), unit), verdict.margin, share)
 
 
 def demonstrated_text(verdict: Verdict, unit: str) -> str:
-    """The demonstrated bound, or both of a requirement with two limits, in digits that show the margin."""
+    """The demonstrated bound, or both of a requirement with two limits, in digits that show the margin.
+
+    Rounded outward: the range that is printed holds the one that was demonstrated.
+    """
     if verdict.enclosed is not None:
         low, high = verdict.enclosed
         fine = 0.01 * (high - low)  # the ends to four digits of the width
         if fine < 1e-7 * max(abs(low), abs(high)):
-            return f"{beside_limit(low, fine)} to {with_unit(beside_limit(high, fine), unit)}"
-        return f"{number(low, scale=fine)} to {with_unit(number(high, scale=fine), unit)}"
+            return f"{beside_limit(low, fine, up=False)} to {with_unit(beside_limit(high, fine, up=True), unit)}"
+        return f"{number(low, scale=fine, up=False)} to {with_unit(number(high, scale=fine, up=True), unit)}"
     if verdict.demonstrated is None:
         return "–"
-    return with_unit(beside_limit(verdict.demonstrated, verdict.margin), unit)
+    return with_unit(beside_limit(verdict.demonstrated, verdict.margin, up=verdict.at_least is None), unit)
 
 
 def risk_table(flown: Flown) -> Table | None:

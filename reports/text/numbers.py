@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterable, Sequence
 from decimal import Decimal
 from functools import partial
 from itertools import pairwise
-from math import ceil, floor, isfinite, log10
+from math import floor, isfinite, log10
 
-from mc_engine.numbers_in_text import percent_digits
+from mc_engine.numbers_in_text import decimals_of, outward, percent_digits
 from mc_engine.units import UNITS, unit_suffix
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
@@ -31,29 +31,32 @@ def counted(number: int, noun: str) -> str:
     return f"{count(number)} {noun}{'' if number == 1 else 's'}"
 
 
-def number(value: float | None, digits: int = 5, scale: float | None = None) -> str:
+def number(value: float | None, digits: int = 5, scale: float | None = None, up: bool | None = None) -> str:
     """`value` to `digits` significant digits, or to three digits of `scale` (a spread) if that is finer.
 
     None is a dash; what is nothing beside the scale is 0.  Very large and very small values are powers of ten.
+    up : of a bound, whether it is rounded up or down; other numbers are rounded to nearest.
     """
     if value is None:
         return "–"
     value = float(value)
     if not isfinite(value):
         return "not a number" if value != value else ("∞" if value > 0 else "−∞")
-    if value == 0.0 or (scale is not None and abs(value) < _NEGLIGIBLE * scale):
+    if value == 0.0 or (up is None and scale is not None and abs(value) < _NEGLIGIBLE * scale):
         return "0"
     coarse = scale is not None and isfinite(scale) and scale >= 1e-4  # a small value needs no digits of its own
     if abs(value) >= 1e7 or (abs(value) < 1e-4 and not coarse):
         decimals = max(digits - 2, 2)
         if scale is not None and isfinite(scale) and scale > 0.0:
             decimals = max(decimals, min(2 + floor(log10(abs(value))) - floor(log10(scale)), MOST_GIVEN - 1))
+        value = value if up is None else outward(value, decimals_of(value, decimals + 1), up)
         mantissa, exponent = f"{value:.{decimals}e}".split("e")
         return _power(_trim(mantissa), int(exponent))
-    decimals = max(digits - 1 - floor(log10(abs(value))), 0)
+    decimals = max(decimals_of(value, digits), 0)
     if scale is not None and isfinite(scale) and scale > 0.0:
-        room = max(MOST_DIGITS - 1 - floor(log10(abs(value))), 0)
+        room = max(decimals_of(value, MOST_DIGITS), 0)
         decimals = min(max(2 - floor(log10(scale)), 0), room, MOST_DIGITS)
+    value = value if up is None else outward(value, decimals, up)
     text = f"{value:,.{decimals}f}" if abs(value) >= 1e4 else f"{value:.{decimals}f}"
     if scale is None:
         text = _trim(text)
@@ -61,23 +64,29 @@ def number(value: float | None, digits: int = 5, scale: float | None = None) -> 
 
 
 def limit_number(value: float) -> str:
-    """A limit with all digits that it was given, such as those of a Julian date; a converted one in five digits."""
-    given = len(Decimal(repr(float(value))).normalize().as_tuple().digits)
+    """A limit with all digits that it was given, such as those of a Julian date, also in kilometres in place of metres.
+
+    A limit that a conversion gave more digits than anybody wrote, such as 100/3, has five.
+    """
+    given = len(Decimal(f"{value:.15g}").normalize().as_tuple().digits)  # the last digits of a double are rounding
     return _significant(value, max(given, 5)) if given <= MOST_GIVEN else number(value)
 
 
-def beside_limit(value: float, margin: float | None) -> str:
-    """A number that is compared with a limit: in five digits, or as many as show the margin in three."""
+def beside_limit(value: float, margin: float | None, up: bool) -> str:
+    """A bound that is compared with a limit: in five digits, or as many as show the margin in three.
+
+    up : whether it bounds from above, and is rounded up.
+    """
     if not value or not margin or not isfinite(value) or not isfinite(margin):
-        return number(value)
+        return number(value, up=up)
     digits = max(3 + floor(log10(abs(value))) - floor(log10(abs(margin))), 5)
-    return number(value) if digits == 5 else _significant(value, min(digits, MOST_GIVEN))
+    return number(value, up=up) if digits == 5 else _significant(value, min(digits, MOST_GIVEN), up)
 
 
-def _significant(value: float, digits: int) -> str:
+def _significant(value: float, digits: int, up: bool | None = None) -> str:
     """All the digits asked for; `number` has one less beside a power of ten."""
     beside_power = abs(value) >= 1e7 or abs(value) < 1e-4
-    return number(value, digits + 1 if beside_power else digits)
+    return number(value, digits + 1 if beside_power else digits, up=up)
 
 
 def _power(mantissa: str, exponent: int) -> str:
@@ -119,10 +128,10 @@ def _trim(text: str) -> str:
 
 
 def interval(lower: float | None, upper: float | None, scale: float | None = None) -> str:
-    """[lower, upper]; a limit that the cases are too few for is a dash."""
+    """[lower, upper], each rounded outward; a limit that the cases are too few for is a dash."""
     if lower is None and upper is None:
         return "too few cases"
-    return f"[{number(lower, scale=scale)}, {number(upper, scale=scale)}]"
+    return f"[{number(lower, scale=scale, up=False)}, {number(upper, scale=scale, up=True)}]"
 
 
 def percent(share: float | None, digits: int = 2, up: bool = False) -> str:
@@ -135,9 +144,7 @@ def percent(share: float | None, digits: int = 2, up: bool = False) -> str:
     unit = 1.0 if up else 0.5  # of the last digit, within which 100 % would be printed
     while 0.0 < 1.0 - share < unit * 10.0 ** -(digits + 2) and digits < 8:
         digits += 1
-    scaled = share * 10 ** (digits + 2)
-    scaled = (ceil(scaled - 1e-6) if up else floor(scaled + 1e-6)) / 10**digits
-    return f"{_trim(f'{scaled:.{digits}f}')}{SPACE}%"
+    return f"{_trim(f'{outward(100.0 * share, digits, up):.{digits}f}')}{SPACE}%"
 
 
 def given_percent(share: float) -> str:

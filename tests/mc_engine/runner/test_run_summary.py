@@ -88,6 +88,13 @@ def test_a_grid_has_ends_and_no_percentiles(tmp_path):
     assert " ".join(summary_lines("propellant_kg", found, "kg", random=False)[1].split()[::2]) == "from to"
 
 
+def test_bounds_of_percentiles_in_lines_hold_those_that_were_found():
+    summary = summarize(np.random.default_rng(1).normal(1e6, 3.0, 1000), probabilities=(0.5,))
+    lower, upper = summary_lines("range_m", summary, "m", random=True)[2].split("[")[1].removesuffix("]").split(", ")
+    (median,) = summary.quantiles
+    assert median.lower - 0.1 < float(lower) < median.lower < median.upper < float(upper) < median.upper + 0.1
+
+
 def test_a_summary_in_lines_says_how_many_cases_it_rests_on():
     lines = summary_lines("fuel_kg", summarize(np.array([1.0, np.nan, 2.0])), "kg", random=True)
     assert lines[0] == "fuel_kg [kg]: 2 of 3 cases have a number"

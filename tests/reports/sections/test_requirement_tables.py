@@ -5,6 +5,7 @@ import pytest
 from synthetic_run import synthetic_run
 
 from mc_engine.runner.summary import verdict_line
+from mc_engine.statistics.worst import Limits
 from reports.contents import build
 from reports.run.flown import Flown
 from reports.sections.headline import cost_cards, verdict_cards, warnings
@@ -97,6 +98,25 @@ def test_two_limits_show_the_interval_and_its_margin():
     margin, share = (float(word) for word in row[3].replace(" %)", "").split(" kg ("))
     assert margin == pytest.approx(min(2.5 - high, low + 1.0), abs=1e-3)
     assert share == pytest.approx(100.0 * margin / 1.75, abs=0.1)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("limits", [{}, {"at_most": None, "at_least": 0.01}, {"at_least": -1.0}])
+def test_printed_bounds_and_margins_claim_no_more_than_the_cases_show(seed, limits):
+    """With limits to either side, bounds of six samples each: to nearest, half of them would be on the wrong side."""
+    run = synthetic_run(2000, 0, seed, campaign=mc(2000), requirements=[{**FUEL, **limits}])
+    built = Flown(run, "run")
+    (verdict,) = built.verdicts
+    row = texts(requirement_table(built))[0]
+    low, high = verdict.enclosed or 2 * (verdict.demonstrated,)
+    *lower, upper = (float(word.replace("−", "-")) for word in row[2].removesuffix(" kg").split(" to "))
+    assert all(end <= low for end in lower)
+    assert upper <= low if verdict.at_most is None else upper >= high
+    margin, share = (float(word) for word in row[3].replace(" %)", "").split(" kg ("))
+    assert margin <= verdict.margin
+    assert share <= 100.0 * verdict.margin / Limits(verdict.at_most, verdict.at_least).reach
+    (words,) = [told for _, told in margin_block(built).drawing.plots[0].y.ticks]
+    assert words.replace("\u202f", " ") == f"fuel, {share:g} %"
 
 
 @pytest.mark.parametrize("lowest", [None, -1.0])

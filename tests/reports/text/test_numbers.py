@@ -190,6 +190,8 @@ def test_the_words_of_a_distribution_have_printed_signs_and_powers():
         (12345000.0, "1.2345·10⁷"),
         (10000004.0, "1.0000004·10⁷"),
         (1.2345e-5, "1.2345·10⁻⁵"),
+        (1234567.890123, "1\u202f234\u202f567.890123"),
+        (1234567.890123 / 1000.0, "1234.567890123"),  # 1234.5678901229999 km: no wider than it was given in m
         (2.5 / 86400.0, "2.894·10⁻⁵"),  # converted
         (100.0 / 3.0, "33.333"),
         (-1e50, "−1·10⁵⁰"),
@@ -200,7 +202,31 @@ def test_a_limit_has_the_digits_that_it_was_given(value, text):
 
 
 def test_what_is_compared_with_a_limit_shows_how_far_it_is_from_it():
-    assert beside_limit(2460000.4999983613, 1.36e-6) == "2\u202f460\u202f000.4999984"
-    assert beside_limit(1.91234, 0.59) == "1.9123"
-    assert beside_limit(6431.49, 0.011) == "6431.49"
-    assert beside_limit(2.0, None) == beside_limit(2.0, 0.0) == "2"
+    assert beside_limit(2460000.4999983613, 1.36e-6, up=True) == "2\u202f460\u202f000.4999984"
+    assert beside_limit(1.91234, 0.59, up=False) == "1.9123"
+    assert beside_limit(6431.49, 0.011, up=True) == "6431.49"
+    assert beside_limit(2.0, None, up=True) == beside_limit(2.0, 0.0, up=False) == "2"
+
+
+@pytest.mark.parametrize(
+    ("value", "down", "up"),
+    [
+        (2.3449, "2.34", "2.35"),
+        (-2.3449, "−2.35", "−2.34"),
+        (9.996, "9.99", "10"),
+        (2.5, "2.5", "2.5"),
+        (2.0 - 1.92, "0.08", "0.08"),  # 0.08000000000000007: no more than rounding of the difference
+        (10.0 - 9.93, "0.07", "0.07"),  # 0.07000000000000028
+        (1.23456e-6, "1.234·10⁻⁶", "1.235·10⁻⁶"),
+        (-4.20001e12, "−4.201·10¹²", "−4.2·10¹²"),
+        (0.0, "0", "0"),
+    ],
+)
+def test_a_bound_is_rounded_to_its_own_side(value, down, up):
+    digits = 5 if "·" in up else 3
+    assert (number(value, digits, up=False), number(value, digits, up=True)) == (down, up)
+
+
+def test_an_interval_in_print_holds_the_interval():
+    assert interval(2.30559, 2.40551) == "[2.3055, 2.4056]"
+    assert interval(-1.23456, 1.23451, scale=1.0) == "[−1.24, 1.24]"
