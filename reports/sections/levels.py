@@ -89,20 +89,23 @@ def _metric_panel(flown: Flown, metric: str, levels: list[str], rows: list[np.nd
 def _level_table(
     flown: Flown, name: str, metric: str, levels: list[str], rows: list[np.ndarray], matched: np.ndarray
 ) -> Table:
+    large = flown.largest_is_worst(metric)
+    tail = flown.stated.probability if large else flown.stated.low  # on the side where a limit is
     columns = (
         Column(flown.words(name), "text"),
         Column("Used / tried", "number"),
         *((Column("Smallest", "number"),) if flown.chosen else ()),
         Column("Median", "number"),
-        *(() if flown.chosen else (Column(given_percent(flown.stated.probability), "number"),)),
-        Column("Largest", "number"),
+        *(() if flown.chosen else (Column(given_percent(tail), "number"),)),
+        Column("Largest" if large or flown.chosen else "Smallest", "number"),
         Column(f"Median difference to {levels[0]}", "number"),
         Column(f"Smaller than {levels[0]}", "number"),
     )
     values = flown.values(metric)
-    body, probabilities = [], (0.5,) if flown.chosen else (0.5, flown.stated.probability)
+    body, probabilities = [], (0.5,) if flown.chosen else (0.5, tail)
     for place, (level, group) in enumerate(zip(levels, rows, strict=True)):
         summary = summarize(values[group], probabilities=probabilities, confidence=flown.stated.two_sided)
+        worst = summary.maximum if large or flown.chosen else summary.minimum
         cells = [
             Cell(
                 number(item.value, 4, summary.spread),
@@ -114,9 +117,9 @@ def _level_table(
         if flown.chosen:
             cells.insert(0, Cell(number(summary.minimum, 4, summary.spread), summary.minimum))
         used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
-        largest = Cell(number(summary.maximum, 4, summary.spread), summary.maximum)
+        end = Cell(number(worst, 4, summary.spread), worst)
         against = _difference_cells(flown, values, matched, place)
-        body.append((Cell(level), used, *cells, largest, *against))
+        body.append((Cell(level), used, *cells, end, *against))
     title = f"{axis_label(flown.words(metric), flown.unit(metric))} by {flown.words(name)}{flown.sample_words}"
     return Table(
         title[:1].upper() + title[1:], columns, tuple(body), _pairing_note(flown, levels[0], bool(len(matched)))

@@ -55,6 +55,20 @@ def test_the_figure_holds_the_quantiles_of_each_level():
     assert "<svg" in paper.svg(drawing)
 
 
+@pytest.mark.parametrize(("side", "percent", "end"), [("at_most", 0.9, "Largest"), ("at_least", 0.1, "Smallest")])
+def test_the_outer_percentile_and_the_end_are_those_on_the_side_of_the_limit(side, percent, end):
+    limit = {"name": "load", "metric": "peak_load_g", "share": 0.9, "confidence": 0.9, side: 5.0}
+    run = flown(requirements=[limit])
+    run.manifest["report"] = {"probability": 0.9, "confidence": 0.9}
+    _, tables = choices(build(run, "run"))
+    table = tables["Peak load [g] by law"]
+    assert [column.title for column in table.columns[2:5]] == ["Median", f"{100 * percent:g}\u202f%", end]
+    loads = run.table[run.table["law"] == "two"]["peak_load_g"]
+    (row,) = [row for row in table.rows if row[0].text == "two"]
+    assert row[3].value == pytest.approx(loads.quantile(percent), abs=0.05 * loads.std())
+    assert row[4].value == (loads.max() if side == "at_most" else loads.min())
+
+
 def test_chosen_cases_have_ranges_in_place_of_intervals():
     run = flown()
     run.manifest["campaign"]["design"] = "grid"
