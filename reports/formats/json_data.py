@@ -18,6 +18,8 @@ from reports.run.flown import Flown
 FILE = "report.json"
 WORST = 10  # cases of a requirement
 
+Bounds = Literal["fixed number of cases", "every number of cases"]
+
 
 class _Record(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -39,6 +41,9 @@ class RequirementRecord(_Record):
     demonstrated : the tolerance limit of the metric that holds with the required probability and confidence;
         `enclosed` in its place has two of them where there are two limits, both inside by the margin.
     margin : from the demonstrated bound to the nearest limit, negative outside.
+    bounds : the bounds on the probability, and so the verdict, hold for a "fixed number of cases" or, where that was
+        not fixed in advance, for "every number of cases" at once; None where there are none, as for a grid.
+    failing : of the joint verdict, the requirements that fail it where the fraction inside all limits does not.
     """
 
     name: str
@@ -57,6 +62,8 @@ class RequirementRecord(_Record):
     enclosed: tuple[float, float] | None
     margin: float | None
     verdict: str
+    bounds: Bounds | None
+    failing: list[str] = []
 
 
 class QuantileRecord(_Record):
@@ -136,6 +143,7 @@ class ReportRecord(_Record):
     """What `report.json` holds.  contributor_flights : cases flown for the contributors alone; 0: from the table.
 
     probability, confidence : of all statistics but the requirements' own; each bound of a quantile holds with it.
+    joint : the verdict on all requirements at once, without a metric; None unless there are several.
     """
 
     format: Literal[1] = 1
@@ -147,6 +155,7 @@ class ReportRecord(_Record):
     confidence: float | None = None
     counts: Counts | None = None
     requirements: list[RequirementRecord] = []
+    joint: RequirementRecord | None = None
     metrics: list[MetricRecord] = []
     contributors: list[ContributorRecord] = []
     contributor_flights: int = 0
@@ -184,6 +193,7 @@ def run_data(flown: Flown) -> dict[str, Any]:
         "confidence": flown.stated.confidence,
         "counts": _counts_record(flown),
         "requirements": [_requirement_record(flown, verdict) for verdict in flown.verdicts],
+        "joint": None if flown.joint is None else _requirement_record(flown, flown.joint),
         "metrics": [_metric_record(flown, name, summary) for name, summary in flown.summaries.items()],
         "contributors": [] if contributions is None else [_contributor_record(row) for row in contributions.rows()],
         "contributor_flights": 0 if contributions is None else contributions.flights,
@@ -214,7 +224,15 @@ def _requirement_record(flown: Flown, verdict: Verdict) -> RequirementRecord:
         enclosed=verdict.enclosed,
         margin=_finite(verdict.margin),
         verdict=verdict.outcome,
+        bounds=_bounds(verdict),
+        failing=list(verdict.failing),
     )
+
+
+def _bounds(verdict: Verdict) -> Bounds | None:
+    if verdict.lower is None:
+        return None
+    return "every number of cases" if verdict.looked else "fixed number of cases"
 
 
 def _metric_record(flown: Flown, name: str, summary: Summary) -> MetricRecord:

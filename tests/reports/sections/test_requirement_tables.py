@@ -1,5 +1,7 @@
 """What the report says of requirements."""
 
+import json
+
 import numpy as np
 import pytest
 from synthetic_run import synthetic_run
@@ -7,6 +9,7 @@ from synthetic_run import synthetic_run
 from mc_engine.runner.summary import verdict_line
 from mc_engine.statistics.worst import Limits
 from reports.contents import build
+from reports.formats.json_data import render_json
 from reports.run.flown import Flown
 from reports.sections.headline import cost_cards, verdict_cards, warnings
 from reports.sections.requirement_tables import margin_block, requirement_table, risk_table
@@ -197,6 +200,23 @@ def test_the_joint_card_names_the_requirement_that_fails_it():
     assert (card.label, card.answer) == ("all at once", "fail")
     assert card.detail.endswith("inside; fuel fails with confidence shared.")
     assert verdict_line(found.joint, {}).endswith("confidence); fuel fails with confidence shared")
+
+
+@pytest.mark.parametrize(
+    ("design", "looks", "bounds"),
+    [("mc", [], "fixed number of cases"), ("mc", [100, 1000], "every number of cases"), ("grid", [], None)],
+)
+def test_the_data_have_the_joint_verdict_and_the_kind_of_bounds(design, looks, bounds):
+    run = synthetic_run(1000, 0, campaign={**mc(1000), "design": design}, looks=looks)
+    built = Flown(run, "run")
+    record = json.loads(render_json(build(run, "run")))
+    assert [one["bounds"] for one in (*record["requirements"], record["joint"])] == 4 * [bounds]
+    joint, told = built.joint, record["joint"]
+    assert (told["name"], told["metric"], told["verdict"]) == ("all at once", "", joint.outcome)
+    assert (told["passed"], told["tried"], told["required_probability"]) == (joint.passed, 1000, joint.share)
+    assert (told["demonstrated_probability"], told["failing"]) == (joint.lower, list(joint.failing))
+    alone = build(synthetic_run(100, 0, campaign=mc(100), requirements=[FUEL]), "run")
+    assert json.loads(render_json(alone))["joint"] is None
 
 
 def test_margins_of_a_limit_of_zero_have_no_width():
