@@ -20,6 +20,7 @@ from scipy import stats
 from scipy.special import ndtr
 
 from mc_engine.sampling.streams import stream
+from mc_engine.statistics.binomial import clopper_pearson
 from mc_engine.statistics.direction_mixture import DirectionMixture, fit_mixture, log_normal_density
 from mc_engine.statistics.rare_events import ALLOWANCE, FRESH, Flights, Level, Margin, RareEvent, plain_count
 
@@ -151,7 +152,10 @@ def _estimate(
     confidence: float,
     n_inputs: int,
 ) -> RareEvent:
-    """Fresh cases from the frozen mixture.  The interval is symmetric in the logarithm."""
+    """Fresh cases from the frozen mixture.  The interval is symmetric in the logarithm.
+
+    Weights of cases that all passed bound no probability: without a failure the plain cases of the first level do.
+    """
     before = flights.n
     _, margin, log_weight = _level(flights, mixture, n, max(n_inputs, 2), len(levels), rng)
     share = np.exp(log_weight) / n
@@ -162,8 +166,9 @@ def _estimate(
     cases = replace(cases, u=cases.u[:, :n_inputs])
     remarks = _remarks(ended, effective, probability)
     if probability == 0.0:
-        least = min(level.probability for level in levels)
-        return RareEvent("cross-entropy", 0.0, 0.0, least, confidence, math.inf, tuple(levels), cases, tuple(remarks))
+        plain = cases.failed[cases.level == 0]
+        upper = clopper_pearson(int(plain.sum()), plain.size, confidence)[1]
+        return RareEvent("cross-entropy", 0.0, 0.0, upper, confidence, math.inf, tuple(levels), cases, tuple(remarks))
     error = _variation(failing) / math.sqrt(n - 1)
     reach = math.exp(ALLOWANCE * float(stats.norm.ppf(0.5 * (1.0 + confidence))) * error)
     levels = [*levels, Level(0.0, probability, 1, n, effective / n)]
@@ -176,7 +181,10 @@ def _estimate(
 def _remarks(ended: bool, effective: float, probability: float) -> list[str]:
     remarks = []
     if probability == 0.0:
-        remarks.append("No case failed: the probability is smaller than that of the last level, and no more is shown.")
+        remarks.append(
+            "No case of the last sample failed, so importance sampling demonstrates nothing: the upper bound is that of "
+            "the plain cases of level 0 alone."
+        )
     elif not ended:
         remarks.append(
             "Levels came to a halt before the failures, as where the noise of the flight decides them: the interval "

@@ -168,6 +168,14 @@ def test_what_cannot_fail_is_below_the_last_level():
     assert "No case failed" in event.remarks[0]
 
 
+def test_importance_sampling_without_a_failure_has_the_bound_of_its_plain_cases_alone():
+    """The estimate of a level once was the bound: 1.8e-17, from weights of 500 cases that all passed."""
+    event = cross_entropy(lambda u: 1e-3 + np.exp(-u[:, 0]), 1, cases_per_level=500, seed=1, confidence=0.9)
+    assert event.probability == event.lower == 0.0
+    assert event.upper == pytest.approx(1.0 - 0.05 ** (1 / 500), rel=1e-9)  # Clopper-Pearson, none of 500
+    assert "importance sampling demonstrates nothing" in event.remarks[0]
+
+
 def test_with_runs_at_zero_the_upper_end_is_no_less_than_the_largest_estimate():
     assert interval_of_mean(np.array([2e-5, *9 * [0.0]]), 0.9)[1] == 2e-5  # Student's alone is less
 
