@@ -37,6 +37,7 @@ FEWEST = 10  # numbers in each run, or pairs, for a test of a metric
 MOST_CASES = 200_000
 MOST_DECIMALS = 9  # of an estimate that is printed
 _OF_TIES = 1e-6  # a size and its interval no farther from no change: that of a test whose statistic jumps there
+_BESIDE = 1e-5  # of about the standard error: a change below it is none
 _ROUNDING = 1e-12  # of the largest number: spread below it is rounding
 
 
@@ -234,7 +235,9 @@ def _spread_ratio(a: np.ndarray, b: np.ndarray, paired: bool, unit: float, z: fl
 
 def _inverted(score: Callable[[float], float], start: float, step: float, z: float) -> tuple[Estimate, float]:
     """Where a score that falls with the change is 0, z and -z, and the p-value of no change, at 0."""
-    value, lower, upper = (_root(score, level, start, step) for level in (0.0, z, -z))
+    ends = (_root(score, level, start, step) for level in (0.0, z, -z))
+    # Where ties make the score jump at no change, the search ends beside it.
+    value, lower, upper = (end if abs(end) > _BESIDE * step else 0.0 for end in ends)
     return Estimate(value, min(lower, value), max(upper, value)), _p_value(score(0.0))
 
 

@@ -8,6 +8,7 @@ from mc_engine.sampling.streams import uniforms
 from mc_engine.statistics import change_tests
 from mc_engine.statistics.change_tests import holm, metric_change, share_change
 from mc_engine.studies.comparison import ALPHA
+from mc_engine.studies.comparison_lines import _with_interval
 
 N = 1000
 METRICS = 8
@@ -129,3 +130,23 @@ def test_a_spread_that_grows_by_three_tenths_is_found_and_is_no_shift(paired):
     assert found.spread_p < 1e-4
     assert found.shift_p > 0.01
     assert found.ratio.value == pytest.approx(1.3, rel=0.08)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("paired", [False, True])
+def test_where_ties_let_the_score_jump_at_no_change_the_size_is_none(paired, size):
+    """Counts of pulses once shifted by -7.7e-08, which was printed with all its zeros."""
+    draws = np.random.default_rng(1)
+    a, b = size * draws.integers(0, 4, (2, 400)).astype(float)
+    change = metric_change("pulses", a, b, paired=paired)
+    assert change.shift.value == 0.0
+    assert 0.0 in (change.shift.lower, change.shift.upper)
+    words = _with_interval(change.shift_in_sigma)
+    assert words in ("0 [0, 0]", "0.00 [-0.45, 0.00]")
+    assert not paired or change.ratio.value == 1.0
+
+
+def test_a_shift_far_below_the_error_of_one_case_is_found_in_pairs():
+    a = normal("a", 1)
+    change = metric_change("y", a, a + 2e-6, paired=True)
+    assert change.shift.value == pytest.approx(2e-6, rel=1e-3)
