@@ -182,8 +182,8 @@ def _remarks(ended: bool, effective: float, probability: float) -> list[str]:
     remarks = []
     if probability == 0.0:
         remarks.append(
-            "No case of the last sample failed, so importance sampling demonstrates nothing: the upper bound is that of "
-            "the plain cases of level 0 alone."
+            "No case of the last sample failed, so importance sampling demonstrates nothing: the upper bound is that "
+            "of the plain cases of level 0 alone."
         )
     elif not ended:
         remarks.append(

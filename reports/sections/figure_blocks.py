@@ -109,7 +109,16 @@ def outcome_scatter(flown: Flown, x_name: str, y_name: str, regions: Sequence[Li
 
 
 def distribution_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
-    """Histograms of the metrics that matter, with limits and percentiles; those not drawn, in sentences."""
+    """Histograms of the metrics that matter, with limits and percentiles; those not drawn, in sentences.
+
+    Of cases that were chosen, as those of a grid, a sentence alone.
+    """
+    if flown.chosen and flown.n_tried:
+        yield (
+            f"The cases of this design ({flown.design}) were chosen, not drawn at random, so their metrics have no "
+            "distribution; their ranges are in appendix All metrics."
+        )
+        return
     key, others = _drawable(flown)
     title = "Distributions of the key metrics" if others else "Distributions of the metrics"
     yield from _distribution_figures(flown, key, title)
@@ -129,7 +138,9 @@ def distribution_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
 
 
 def other_distributions(flown: Flown) -> Iterator[FigureBlock]:
-    """Histograms of all other metrics."""
+    """Histograms of all other metrics; none of cases that were chosen."""
+    if flown.chosen:
+        return
     yield from _distribution_figures(flown, _drawable(flown)[1], "Distributions of the other metrics", LOW_PANEL)
 
 

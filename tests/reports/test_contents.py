@@ -198,6 +198,11 @@ def test_cases_of_a_grid_are_not_sold_as_probabilities():
     assert not {"Percentiles of the metrics", "Statistics of the metrics"} & {*tables(document)}
     keys = [mark.key for block in blocks_of(document, FigureBlock) for mark in block.drawing.key]
     assert [key for key in keys if "percentile" in key or key == "median"] == []
+    captions = [block.caption for block in blocks_of(document, FigureBlock)]
+    assert [caption for caption in captions if caption.startswith("Distributions")] == []
+    (section,) = [section for section in document.sections if section.anchor == "distributions"]
+    (sentence,) = section.blocks
+    assert "were chosen, not drawn at random, so their metrics have no distribution" in sentence.paragraphs[0]
 
 
 def test_the_metrics_of_a_grid_have_their_ends_and_the_cases_there():
