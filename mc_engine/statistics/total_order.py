@@ -17,7 +17,7 @@ Sudret, Reliab. Eng. Syst. Saf. 93 (2008), 964-979 (indices from polynomial chao
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -36,6 +36,7 @@ MOST_TERMS = 300  # a metric
 MOST_VALUES = 1_000_000  # inputs times cases; of more cases an even choice is taken
 FEWEST_PICKED = 5_000  # cases of that choice
 CASES_PER_TERM = 10
+FALSE_TERMS = 0.05  # chance that any term of a metric without effects is taken for one that surely is there
 FALSE_PAIRS = 0.01  # chance of taking up any pair where there is none
 _CASES_PER_TAIL = 30  # a function with a kurtosis above n over this rests on a handful of cases, and is left out
 _OLD = 0.03  # of a function's size; one that the others leave less of is theirs already
@@ -138,13 +139,17 @@ def _steps(columns: Sequence[InputColumn], left: np.ndarray) -> tuple[np.ndarray
 
 @dataclass(frozen=True)
 class _Fit:
-    """Terms, their columns float64[n, n_terms] and coefficients; y: the metric, mean 0 and variance 1; left of it."""
+    """Terms, their columns float64[n, n_terms] and coefficients; y: the metric, mean 0 and variance 1; left of it.
+
+    tried : the most terms that any of them was picked from.
+    """
 
     terms: tuple[Term, ...]
     columns: np.ndarray
     coefficient: np.ndarray
     y: np.ndarray
     left: np.ndarray
+    tried: int = 1
 
     @property
     def noise(self) -> float:
@@ -183,7 +188,7 @@ def _extended(basis: Sequence[_Functions], fit: _Fit, groups: Sequence[Group]) -
         fresh = [terms[k] for k in order[:room] if _has_no_tail(_column(basis, terms[k]))]
         if not fresh:
             break
-        fit = _refit(basis, fit, fresh)
+        fit = replace(_refit(basis, fit, fresh), tried=max(fit.tried, len(terms)))
     return fit
 
 
@@ -268,7 +273,9 @@ def _indices(basis: Sequence[_Functions], fit: _Fit) -> tuple[np.ndarray, np.nda
 
     The squared coefficients of an input's terms, less what chance puts into each, over those of all terms and the
     variance that is left.  The error is that of the influence function of this ratio: coefficients move with what is
-    left, and both variances with the cases, as far as single inputs give them.
+    left, and both variances with the cases, as far as single inputs give them.  Terms are picked for being large, and
+    what is left is seldom as wide everywhere: one that Bonferroni over all terms tried, with White's variance of its
+    coefficient, does not find counts as error.  White, Econometrica 48 (1980), 817-838.
     """
     n, n_inputs = fit.y.size, len(basis)
     member = np.zeros((len(fit.terms), n_inputs))
@@ -289,4 +296,8 @@ def _indices(basis: Sequence[_Functions], fit: _Fit) -> tuple[np.ndarray, np.nda
     influence = low @ (low.T @ of_cases) / n
     influence += 2.0 * part * left - share[active] * (2.0 * explained * left + left**2)
     error[active] = influence.std(axis=0) / (whole * np.sqrt(n))
+    spread = np.maximum((fit.columns**2 * left**2).mean(axis=0), fit.noise)
+    sure = fit.coefficient**2 * n > ndtri(0.5 * FALSE_TERMS / fit.tried) ** 2 * spread
+    doubtful = np.where(sure, 0.0, variance)
+    error[active] = np.hypot(error[active], doubtful @ member[:, active] / whole)
     return share, error
