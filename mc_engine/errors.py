@@ -5,7 +5,7 @@ EngineError
   ModelError        the model of the campaign breaks its contract
   StoreError        the run directory is damaged, busy, or belongs to another campaign
     DiskError       the disk is full, write-protected or broken; committed cases are safe
-    UsageError      what was asked of a run, a folder or a URL is not possible; nothing is damaged
+    UsageError      a request that a run, a folder or a URL cannot meet; nothing is damaged
   RunInterrupted    the run was stopped; committed cases are safe, and `resume` completes the run
   WorkersLost       the workers cannot be reached, or die repeatedly
 """
@@ -96,7 +96,7 @@ class DiskError(StoreError):
 
 
 class UsageError(StoreError):
-    """What was asked of a run, a folder or a URL is not possible, and nothing is damaged; the text says what is."""
+    """A request that a run, a folder or a URL cannot meet; nothing is damaged, and the text says what can be done."""
 
 
 class RunInterrupted(EngineError):
