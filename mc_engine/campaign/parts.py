@@ -30,7 +30,7 @@ from mc_engine.model.record import Refusals, load_model
 from mc_engine.model.simulator import Simulator, System, load_simulator
 from mc_engine.sampling.correlation import group_matrix, is_positive_definite
 from mc_engine.sampling.designs import IN_BLOCKS, RANDOM, block_problem
-from mc_engine.sampling.distributions import Scalar
+from mc_engine.sampling.distributions import Discrete, Scalar
 from mc_engine.sampling.sobol import MAX_DIMENSIONS
 from mc_engine.suggestions import hint, listed
 
@@ -190,6 +190,9 @@ def _check_correlated(name: str, by_name: Mapping[str, Dispersion], model: Syste
         findings.add("between", f'"{name}" is a setting; only parameters can be correlated')
     elif by_name[name].dist == "constant":
         findings.add("between", f'"{name}" is constant; it cannot be correlated')
+    elif isinstance(drawn := by_name[name].distribution, Discrete) and list(drawn.values) != sorted(drawn.values):
+        # Quantiles go in the order written, so that the correlation would be that of the places.
+        findings.add("between", f'the values of "{name}" must rise to be correlated; sort them, each with its weight')
 
 
 def rank_pairs(correlations: Sequence[Correlation]) -> tuple[tuple[str, str, float], ...]:

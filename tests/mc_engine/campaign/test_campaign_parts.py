@@ -16,6 +16,7 @@ THIRD = '[dispersion.mass_kg]\ndist = "uniform"\nhalf_range = 1\n'
 PAIRS = ('"speed_pct", "height_km"', '"speed_pct", "mass_kg"', '"height_km", "mass_kg"')
 OPPOSED = [f"[[correlation]]\nbetween = [{pair}]\nrank = -0.7\n" for pair in PAIRS]
 CONSTANT_MASS = '[dispersion.mass_kg]\ndist = "constant"\nvalue = 1'
+FALLING_MASS = '[dispersion.mass_kg]\ndist = "discrete"\nvalues = [30, 20]\n'
 DISCRETE_CONTROL = '[dispersion.control]\ndist = "discrete"\nvalues = ["off"]'
 CORRELATION = '[[correlation]]\nbetween = ["speed_pct", "height_km"]\nrank = 0.3\n'
 
@@ -61,6 +62,8 @@ MISTAKES = [
      "speed_pct ~ height_km = -0.7, speed_pct ~ mass_kg = -0.7, height_km ~ mass_kg = -0.7 "
      "(the matrix is not positive definite)"),
     (_with("mass_kg") + CONSTANT_MASS, "correlation 1.between", '"mass_kg" is constant; it cannot be correlated'),
+    (_with("mass_kg") + FALLING_MASS, "correlation 1.between",
+     'the values of "mass_kg" must rise to be correlated; sort them, each with its weight'),
     (_with("control") + DISCRETE_CONTROL, "correlation 1.between",
      '"control" is a setting; only parameters can be correlated'),
     (_required('metric = "range_m"'), "requirement.r", "has no limit; give at_most, at_least or both"),
