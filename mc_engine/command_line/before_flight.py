@@ -152,7 +152,7 @@ def plan(
         lines = [*plan_lines(campaign, numbers, two_sided)]
     else:
         share, confidence = _probability("--share", share), _probability("--confidence", confidence)
-        lines = [f"share {share:.10g} with confidence {confidence:.10g}", ""]
+        lines = [f"share {share:.14g} with confidence {confidence:.10g}", ""]
         lines += table_lines([plan_row(share, confidence, number) for number in numbers], share, confidence)
         lines += ["", *interval_lines(share, confidence)] if two_sided else []
     for line in lines:

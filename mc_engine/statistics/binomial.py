@@ -104,7 +104,10 @@ def pass_chance(tried: int, accepted: int | None, true_share: float) -> float:
     At the wanted share it is the consumer's risk, above it one less the producer's.  accepted None: 0.
     Hanson & Beard, NASA/TP-2010-216447, section 4.
     """
-    return 0.0 if accepted is None else float(scipy.special.bdtr(accepted, tried, 1.0 - true_share))
+    if accepted is None:
+        return 0.0
+    # not bdtr, which is NaN beyond 2**31 cases
+    return float(scipy.special.betainc(tried - accepted, accepted + 1, true_share)) if accepted < tried else 1.0
 
 
 def smallest_sample(share: float, confidence: float, failures: int = 0) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
+from math import floor, log10
 from typing import NamedTuple
 
 from mc_engine.campaign.loading import Campaign
@@ -46,10 +47,16 @@ def table_lines(rows: Sequence[PlanRow], share: float, confidence: float) -> Ite
     """A line per row, under a heading; with the cases that `run --until verdict` takes for as many failures."""
     heading = f"{'failures':>8}  {'cases':>9}  {'until verdict':>13}  {'demonstrated share':>18}"
     yield f"{heading}  passes at half the failures"
+    digits = max(6, 3 - floor(log10(1.0 - share)))  # three of the share that may fail
     for row in rows:
         anytime = smallest_at_any_time(share, confidence, row.failures)
+<<<<<<< HEAD
         shown = outward(row.shown, 6, up=False)
         yield f"{row.failures:>8}  {row.cases:>9}  {anytime:>13}  {shown:>18.6f}  {100.0 * row.half_rate:.1f} %"
+=======
+        shown = f"{row.shown:.{digits}f}"
+        yield f"{row.failures:>8}  {row.cases:>9}  {anytime:>13}  {shown:>18}  {100.0 * row.half_rate:.1f} %"
+>>>>>>> d7334b2 (Plan: chances and shares next to one have numbers and digits; they were nan and 1)
 
 
 def interval_lines(share: float, confidence: float) -> Iterator[str]:
@@ -84,7 +91,7 @@ def _requirement_block(
     names: str, share: float, confidence: float, failures: Sequence[int], cases: int, two_sided: bool
 ) -> Iterator[str]:
     yield ""
-    yield f"{names}: share {share:.10g} with confidence {confidence:.10g}"
+    yield f"{names}: share {share:.14g} with confidence {confidence:.10g}"
     yield from table_lines([plan_row(share, confidence, number) for number in failures], share, confidence)
     yield _allowance(cases, share, confidence)
     if two_sided:

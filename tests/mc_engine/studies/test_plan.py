@@ -1,10 +1,10 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import binom
+from scipy.stats import binom, poisson
 
 from mc_engine.statistics.binomial import acceptance_number, lower_bound, smallest_sample
-from mc_engine.studies.plan import plan_row
+from mc_engine.studies.plan import plan_row, table_lines
 
 # share, confidence: smallest samples for 0, 1, 2, ... failures.
 # 59, 93, 124 and 299, 473: Wilks, Ann. Math. Stat. 12 (1941), one-sided tolerance limits; the others by scipy.
@@ -40,3 +40,11 @@ def test_the_acceptance_number_is_the_last_that_demonstrates(share, confidence, 
 @pytest.mark.parametrize("row", ROWS)
 def test_a_row_says_how_likely_a_system_passes_that_fails_half_as_often(row):
     assert row.half_rate == pytest.approx(binom.cdf(row.failures, row.cases, 0.00135), rel=1e-9)
+
+
+def test_a_share_next_to_one_is_demonstrated_with_digits_and_chances_that_are_numbers():
+    share, confidence = 1.0 - 1e-11, 0.99  # more than 2**31 cases
+    row = plan_row(share, confidence, 1)
+    assert row.half_rate == pytest.approx(poisson.cdf(1, 0.5e-11 * row.cases), rel=1e-6)
+    shown = float(list(table_lines([row], share, confidence))[1].split()[3])
+    assert share <= shown < 1.0
