@@ -149,7 +149,8 @@ def _failed_inputs(limit: LimitState, estimate: RareEvent) -> tuple[list[dict[st
     u, weight = estimate.cases.u[failed], estimate.cases.weight[failed]
     nearest = int(np.argmin((u * u).sum(axis=1)))
     share = weight / weight.sum()
-    apart = float(np.linalg.norm(share @ u)) < _APART * float(np.linalg.norm(u[nearest]))
+    rare = estimate.probability < 0.5  # else they surround the origin, in one region
+    apart = rare and float(np.linalg.norm(share @ u)) < _APART * float(np.linalg.norm(u[nearest]))
     across = np.flatnonzero(u @ u[nearest] < 0.0) if apart else np.empty(0, int)
     shown = {"likeliest": nearest}
     if across.size:

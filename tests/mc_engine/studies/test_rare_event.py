@@ -143,6 +143,12 @@ def test_a_case_without_a_number_has_failed_and_one_at_its_limit_has_not():
     assert lost.status[0][1] == "refused"
 
 
+def test_failures_all_around_the_origin_are_one_region(tmp_path):
+    result = estimate_rare_event(minimal(5000.0), out=tmp_path / "out", cases_per_level=500, workers=1).result
+    assert result["probability"] == 1.0
+    assert [remark.split(":")[0] for remark in result["remarks"]] == ["Failures are frequent"]
+
+
 def with_pitch(campaign, distribution):
     """The campaign with another distribution of its second input."""
     size, pitch = campaign.dispersions
