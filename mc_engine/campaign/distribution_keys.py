@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 from mc_engine.campaign.inputs import accepted_range, check_value, number
 from mc_engine.campaign.reading import Findings
+from mc_engine.campaign.sections import LARGEST
 from mc_engine.campaign.tables_beside import empirical_numbers
 from mc_engine.model.fields import Parameter, Setting
 from mc_engine.model.files import FileFault, resolve_beside
@@ -190,8 +191,8 @@ def _discrete(context: DispersionContext) -> Distribution | None:
     weights = context.keys.weights if context.keys.weights is not None else [1.0] * len(values)
     if len(weights) != len(values):
         context.findings.add("weights", f"{len(weights)} weights for {len(values)} values")
-    elif not sum(weights) > 0.0:
-        context.findings.add("weights", "are all zero")
+    elif not sum(weights) >= 1.0 / LARGEST:
+        context.findings.add("weights", "are too small" if any(weights) else "are all zero")
     elif None not in values:
         return Discrete(tuple(value for value in values if value is not None), tuple(weights))
     return None

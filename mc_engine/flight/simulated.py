@@ -26,6 +26,11 @@ _FEW_MINUTES = 360.0  # s, a tenth of an hour
 _TOGETHER = 64  # cases of a batch, where one may end the worker of all
 
 
+def about(number: float, unit: str) -> str:
+    """The number with two digits, without an exponent up to a million: 120 s."""
+    return f"{float(f'{number:.2g}'):g} {unit}"
+
+
 class SimulatorFlyer(Flyer):
     """A Python function, a program or an FMU."""
 
@@ -138,7 +143,7 @@ class SimulatorFlyer(Flyer):
         cores = os.cpu_count() or 1
         workers = min(cores, self.most_workers or cores)
         whole = seconds * self._campaign.cases / workers
-        takes = f"{whole / 3600.0:.2g} hours" if whole > _FEW_MINUTES else f"{whole:.2g} s"
+        takes = about(whole / 3600.0, "hours") if whole > _FEW_MINUTES else about(whole, "s")
         who = f"{workers} worker{'s' * (workers > 1)}"
         lines.append(f"{seconds:.3g} s a case, {takes} for {self._campaign.cases:,} cases on {who}")
         return lines

@@ -90,6 +90,7 @@ MISTAKES = [
     ('dist = "beta"\nalpha = 1\nbeta = 1\nlower = 2\nupper = 1', "lower", "2 is not below upper = 1"),
     ('dist = "discrete"\nvalues = [1, 2]\nweights = [1]', "weights", "1 weights for 2 values"),
     ('dist = "discrete"\nvalues = [1, 2]\nweights = [0, 0]', "weights", "are all zero"),
+    ('dist = "discrete"\nvalues = [1, 2]\nweights = [5e-324, 0]', "weights", "are too small"),
     ('dist = "discrete"\nvalues = [1, 2]\nweights = [1, -1]', "weights 2", BELOW),
     ('dist = "discrete"\nvalues = [1, "x"]', "values 2", '"x" is not a number; height_km is Height [km]'),
     ('dist = "discrete"\nvalues = []', "values", "0 given; at least 1 needed"),

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from mc_engine import CampaignError, StoreError, load_campaign, open_run, replay, resume, run
 from mc_engine.command_line.commands import app
+from mc_engine.flight.simulated import about
 from mc_engine.runner import histories
 from mc_engine.runner.importing import import_results
 from mc_engine.runner.runner import Backend, extend, rerun
@@ -293,3 +294,8 @@ def test_the_histories_of_a_batch_simulator_are_shared_out_among_the_workers(tmp
     store = run(load_campaign(file), folder / "run", workers=2)
     assert set(store.histories()["case_id"]) == {-1, *range(40)}
     assert max(map(len, pieces)) <= 20  # two workers and more have some to fly
+
+
+@pytest.mark.parametrize(("number", "words"), [(0.0123, "0.012 s"), (9.96, "10 s"), (124.0, "120 s"), (359.0, "360 s")])
+def test_the_time_that_a_campaign_will_take_has_no_exponent(number, words):
+    assert about(number, "s") == words
