@@ -50,13 +50,8 @@ def table_lines(rows: Sequence[PlanRow], share: float, confidence: float) -> Ite
     digits = max(6, 3 - floor(log10(1.0 - share)))  # three of the share that may fail
     for row in rows:
         anytime = smallest_at_any_time(share, confidence, row.failures)
-<<<<<<< HEAD
-        shown = outward(row.shown, 6, up=False)
-        yield f"{row.failures:>8}  {row.cases:>9}  {anytime:>13}  {shown:>18.6f}  {100.0 * row.half_rate:.1f} %"
-=======
-        shown = f"{row.shown:.{digits}f}"
+        shown = f"{outward(row.shown, digits, up=False):.{digits}f}"
         yield f"{row.failures:>8}  {row.cases:>9}  {anytime:>13}  {shown:>18}  {100.0 * row.half_rate:.1f} %"
->>>>>>> d7334b2 (Plan: chances and shares next to one have numbers and digits; they were nan and 1)
 
 
 def interval_lines(share: float, confidence: float) -> Iterator[str]:
