@@ -307,8 +307,10 @@ def _track_by_all(looks, number, t, h, closing, lanes, count, smooth, seen, last
     if any_lane(ended):
         before = grid_time(number - 1, h, t)
         best, when, last = search(looks, number - 1, before, h, looks.count, True, ended, smooth, best, when, last)
-    put_stage(looks.peaks, number % LOOKS, seen[4])
-    put_stage(looks.lasts, number % LOOKS, lasts[1])
+    # of lanes that only fly beside one that ends, the look that would be overwritten here may still be needed
+    place = number % LOOKS
+    put_stage(looks.peaks, place, select(lanes, seen[4], take_stage(looks.peaks, place, best)))
+    put_stage(looks.lasts, place, select(lanes, lasts[1], take_stage(looks.lasts, place, last)))
     # around the end of a motion three looks have to do
     corner, v1, v2, v3 = map_fields(_at_corner, smooth, count < 3.0), seen[2], seen[3], seen[4]
     best, when = track_by_three(number, t, h, True, lanes, corner, newest_twice(seen), best, when)

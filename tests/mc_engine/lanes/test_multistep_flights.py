@@ -105,6 +105,18 @@ def test_extremes_beside_samples_of_the_control_are_searched_on_the_motion_befor
 
 
 @pytest.mark.parametrize("method", ["abm11", "gj8"])
+def test_a_crest_before_a_sample_is_the_same_beside_a_case_that_ends_in_that_step(method):
+    # crests before the look at 3.1 s, the last before a sample; two cases break, by either method one in the step after
+    crests = np.append(np.linspace(3.04, 3.09, 6), [3.1, 3.1])
+    swings = {"x0_km": np.cos(crests), "v0_m_s": 1e3 * np.sin(crests), "every": 32.0, "until_s": 6.0, "step_s": 0.1}
+    breaks = np.append(np.full(6, 1e9), [3.05, 3.15])
+    columns = flown(by(OSCILLATOR, method), **swings, breaks_at_s=breaks)
+    assert columns["status"].tolist() == ["ok"] * 6 + ["not-finite"] * 2
+    same_bytes(columns, flown(by(OSCILLATOR, method), width=1, **swings, breaks_at_s=breaks))
+    np.testing.assert_allclose(columns["top_km"][:6], 1.0, rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("method", ["abm11", "gj8"])
 def test_a_stop_is_found_to_the_last_digits(method):
     columns = flown(by(RAIL, method), rate_rad_s=1.0, x0_m=1.0, end_m=-0.3, step_s=0.05)
     assert columns["end_time_s"][0] == pytest.approx(math.acos(-0.3), abs=1e-13)
