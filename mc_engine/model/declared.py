@@ -236,7 +236,8 @@ def _refuse_idle_events(events: Mapping[str, Event], switch: Any, parameters: tu
     """ModelError for an event that switches nothing, or waits for what is no parameter."""
     for name, event in events.items():
         if event.action == "switch" and not event.to and switch is None:
-            raise ModelError(f'event "{name}" has the action "switch", but the model has no function `switch`')
+            raise ModelError(f'event "{name}" has the action "switch", but the model has no function `switch`; for an '
+                             "event that is only noted, write one that returns (s, m)")  # fmt: skip
         if isinstance(event.after, str) and event.after not in parameters:
             raise ModelError(f'the event "{name}" acts after "{event.after}", and no parameter has this name without '
                              f"its unit{hint(event.after, parameters)}")  # fmt: skip

@@ -51,7 +51,7 @@ MISTAKES = {
     "nearly since": (("def observe(s)", "def observe(s, sinc)"), 'takes "sinc"; did you mean "since"?'),
     "control without memory": (("Phase(rhs, events={\"far\"", "Phase(rhs, rhs, events={\"far\""),
                                "name its class, memory=Memory"),
-    "no function to switch": (('"falling", "stop")}', '"falling", "switch")}'), "the model has no function `switch`"),
+    "no function to switch": (('"falling", "stop")}', '"falling", "switch")}'), "no function `switch`; for"),
     "a phase of no word": (('"away": Phase', '"2nd": Phase'), "'2nd'"),
     "a reserved column": (('altitude_km="altitude"', 'phase=Field("x", unit=""), altitude_km="altitude"'),
                           ("import Event,", "import Event, Field,"), 'the output "phase" has the name of a column'),
