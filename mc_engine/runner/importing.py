@@ -24,12 +24,12 @@ from mc_engine.runner.flown_campaign import companions_of
 from mc_engine.runner.manifest import columns_of, manifest_of
 from mc_engine.sampling.distributions import column as typed_column
 from mc_engine.status import NO_RESULT, NOT_FINITE, OK, STATUS_NAME
+from mc_engine.store.run_files import NOMINAL_CASE
 from mc_engine.store.store import Store, create_store
 from mc_engine.suggestions import hint
 
 _SAME = 1e-9  # of an input, which a CSV may round
 _MOST = 20  # problems of one table
-_NOMINAL = -1  # the case_id of the nominal case
 
 
 def import_results(campaign: Campaign, file: Path, out: Path, history: Path | None = None) -> Store:
@@ -85,10 +85,10 @@ def _results(campaign: Campaign, file: Path, table: Columns, problems: list[Prob
     if problems:
         return {}, {}
     order = np.argsort(ids)
-    order = order[ids[order] != _NOMINAL]
+    order = order[ids[order] != NOMINAL_CASE]
     drawn = case_table(campaign, np.arange(campaign.cases))
     _refuse_unknown_words(table, problems)
-    place = np.flatnonzero(ids == _NOMINAL)
+    place = np.flatnonzero(ids == NOMINAL_CASE)
     for name in inputs:
         _compare(name, table[name][order], drawn[name], file, problems)
         wanted = typed_column([campaign.nominal[name]] * place.size)
@@ -112,10 +112,10 @@ def _wrong_ids(campaign: Campaign, ids: np.ndarray) -> list[Problem]:
 
 def _unknown_ids(campaign: Campaign, ids: np.ndarray) -> list[Problem]:
     """The first case id of a table that the campaign has not."""
-    unknown = np.flatnonzero(~np.isin(ids, np.arange(_NOMINAL, campaign.cases)))
+    unknown = np.flatnonzero(~np.isin(ids, np.arange(NOMINAL_CASE, campaign.cases)))
     if not unknown.size:
         return []
-    has = f"it has the cases 0 to {campaign.cases - 1}, and {_NOMINAL} for the nominal case"
+    has = f"it has the cases 0 to {campaign.cases - 1}, and {NOMINAL_CASE} for the nominal case"
     way_out = "remove the row, or choose another number of cases with --cases"
     row = unknown[0]
     return [Problem("case_id", f"row {row + 1}: {ids[row]:.15g} is no case of the campaign; {has}; {way_out}")]

@@ -36,7 +36,6 @@ from mc_engine.statistics.moments import in_units, near_one
 FEWEST = 10  # numbers in each run, or pairs, for a test of a metric
 MOST_CASES = 200_000
 MOST_DECIMALS = 9  # of an estimate that is printed
-_OF_TIES = 1e-6  # a size and its interval no farther from no change: that of a test whose statistic jumps there
 _BESIDE = 1e-5  # of about the standard error: a change below it is none
 _ROUNDING = 1e-12  # of the largest number: spread below it is rounding
 
@@ -310,4 +309,4 @@ def finite(estimate: Estimate) -> bool:
 
 def hidden_by_ties(estimate: Estimate, unchanged: float, significant: bool) -> bool:
     """Whether so many cases have equal values that the size of a significant change, with its interval, is none."""
-    return significant and all(abs(end - unchanged) <= _OF_TIES for end in astuple(estimate))
+    return significant and all(end == unchanged for end in astuple(estimate))
