@@ -3,9 +3,9 @@
 Salmon, Moraes, Dror & Shaw, Parallel random numbers: as easy as 1, 2, 3, SC'11, section 3.3.  NumPy's generator steps
 its counter before the first block, hence the 1 in the lowest word.
 
-Few numbers are computed with NumPy, many by machine code that LLVM makes in some milliseconds: the processor has the
-product of two 64-bit words with all its bits, which NumPy has not, so that it takes a tenth of the time, and does not
-hold the interpreter lock.  Both give the same bits.
+The first numbers of a process are computed with NumPy, later ones by machine code that LLVM makes in some milliseconds:
+the processor has the product of two 64-bit words with all its bits, which NumPy has not, so that it takes a tenth of
+the time, and does not hold the interpreter lock.  Both give the same bits.
 """
 
 import ctypes
@@ -14,13 +14,14 @@ from typing import Any
 
 import numpy as np
 
-_MANY = 2**16  # numbers; for fewer, importing and running LLVM takes longer than what it spares
+_MANY = 2**16  # numbers of a process; for fewer, importing and running LLVM takes longer than what it spares
 _BLOCK = 8192  # numbers that NumPy works on at a time: the few arrays of a block stay in the second-level cache
 _LOW = np.uint64(0xFFFFFFFF)
 _HALF = np.uint64(32)
 _MULTIPLIERS = (0xD2E7470EE14C6C93, 0xCA5A826395121157)
 _WEYL = (0x9E3779B97F4A7C15, 0xBB67AE8584CAA73B)
 _STEPS = [[i * w % 2**64 for w in _WEYL] for i in range(10)]  # from the key to that of each round
+_drawn = 0  # by this process, about: threads may count at the same time
 
 
 def first_numbers(keys: np.ndarray, cases: np.ndarray) -> np.ndarray:
@@ -28,8 +29,10 @@ def first_numbers(keys: np.ndarray, cases: np.ndarray) -> np.ndarray:
 
     keys : uint64[n_keys, 2].  cases : uint64[n].
     """
+    global _drawn
     numbers = np.empty((len(keys), cases.size))
-    if numbers.size >= _MANY:
+    _drawn += numbers.size
+    if _drawn >= _MANY:
         function, _owner = _machine_code()
         cases = np.ascontiguousarray(cases)
         for key, row in zip(keys.tolist(), numbers, strict=True):

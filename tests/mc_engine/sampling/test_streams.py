@@ -20,14 +20,27 @@ def test_each_uniform_is_the_first_number_of_its_stream_bit_for_bit(seed, name, 
     assert draws.tolist() == [stream(seed, name, case).random() for case in cases]
 
 
-def test_many_numbers_at_once_are_the_first_numbers_of_their_streams_too():
-    names, n = ["ve_pct", "oe_deg", "a"], first_numbers._MANY // 3 + 1
-    cases = np.random.default_rng(1).integers(0, 2**62, n)
-    many = uniform_columns(11, names, cases)
-    few = np.concatenate([uniform_columns(11, names, part) for part in np.array_split(cases, 7)], axis=1)
-    assert many.tobytes() == few.tobytes()
-    for place in (0, 1, n - 1):
-        assert many[:, place].tolist() == [stream(11, name, int(cases[place])).random() for name in names]
+def test_the_first_numbers_of_a_process_are_those_that_machine_code_draws_later(monkeypatch):
+    names = ["ve_pct", "oe_deg", "a"]
+    cases = np.random.default_rng(1).integers(0, 2**62, 20_000)
+    drawn = {}
+    for before, uses_machine_code in ((0, False), (first_numbers._MANY, True)):
+        monkeypatch.setattr(first_numbers, "_drawn", before)
+        first_numbers._machine_code.cache_clear()
+        drawn[uses_machine_code] = uniform_columns(11, names, cases)
+        assert (first_numbers._machine_code.cache_info().currsize == 1) == uses_machine_code
+    assert drawn[False].tobytes() == drawn[True].tobytes()
+    for place in (0, 1, cases.size - 1):
+        assert drawn[True][:, place].tolist() == [stream(11, name, int(cases[place])).random() for name in names]
+
+
+def test_pieces_of_a_long_run_are_drawn_by_machine_code_however_short_they_are(monkeypatch):
+    monkeypatch.setattr(first_numbers, "_drawn", 0)
+    first_numbers._machine_code.cache_clear()
+    for piece in np.array_split(np.arange(first_numbers._MANY), 8):
+        assert first_numbers._machine_code.cache_info().currsize == 0
+        uniforms(7, "dv", piece)
+    assert first_numbers._machine_code.cache_info().currsize == 1
 
 
 def test_threads_that_ask_for_many_numbers_at_once_get_the_same(monkeypatch):
