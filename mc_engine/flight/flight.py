@@ -9,6 +9,7 @@ import numpy as np
 
 from mc_engine.campaign.columns import END_PHASE, END_TIME
 from mc_engine.errors import ModelError
+from mc_engine.flight.flyer import phase_words, status_words
 from mc_engine.flight.kernel import Builder, adaptive_arguments, build_kernel, fixed_arguments, grid_of, usual_width
 from mc_engine.flight.kernel_parts import blocks_of, settings_class
 from mc_engine.lanes.kernel_data import gathered
@@ -18,7 +19,7 @@ from mc_engine.model.fields import AdaptiveStep, FixedStep, Parameter, Setting
 from mc_engine.model.preparation import Inputs, Prepared, prepare
 from mc_engine.model.record import Model, Refusals
 from mc_engine.model.trial import refuse_unfit
-from mc_engine.status import OK, REFUSED, STATUS_NAME
+from mc_engine.status import OK, REFUSED
 
 _NO_TABLES, _NO_HISTORY = np.empty(0), np.empty((0, 0))
 _NO_RECORDING = _NO_HISTORY, np.empty(0, dtype=np.int64), np.ones(1)
@@ -26,7 +27,6 @@ _MOST_RECORDED = 200_000  # rows of a flight, of which its history keeps some
 _USUAL_ROOM = 2_000  # rows of adaptive steps that are recorded without counting them first
 _MOST_NUMBERS = 2**24  # of the rows of cases that fly together: 128 MiB
 _OVERSAMPLED = 4  # times as many rows as are kept, where steps are so long that they are divided
-_STATUS_WORDS = np.array([STATUS_NAME[code] for code in range(len(STATUS_NAME))], dtype=object)
 
 
 def fly(
@@ -71,7 +71,7 @@ def _columns(model: Model, refusals: Refusals, out: tuple[np.ndarray, ...]) -> d
         numbers[np.isnan(numbers)] = np.nan  # processors and cards give it different signs
     time, status, states, metrics = out
     reason = refusals.reason.astype(object)
-    columns = {"status": _STATUS_WORDS[status.astype(int)], "reason": reason, END_TIME: time}
+    columns = {"status": status_words(status), "reason": reason, END_TIME: time}
     if model.phases:
         columns[END_PHASE] = last_phase = phase_words(model, metrics[-1])
         failed = (status != OK) & (last_phase != "")
@@ -80,13 +80,6 @@ def _columns(model: Model, refusals: Refusals, out: tuple[np.ndarray, ...]) -> d
     metrics[:, status != OK] = np.nan
     columns |= {f"end_{field.name}": row / field.si_factor for field, row in zip(model.states, states, strict=True)}
     return columns | {field.name: row / field.si_factor for field, row in zip(model.metrics, metrics, strict=True)}
-
-
-def phase_words(model: Model, numbers: np.ndarray) -> np.ndarray:
-    """object[n] of str, the names of the phases with these numbers; empty for NaN and in a model without phases."""
-    words = np.array([*model.phases, ""], dtype=object)
-    known = np.isfinite(numbers) & bool(model.phases)
-    return words[np.where(known, np.nan_to_num(numbers), -1).astype(int)]
 
 
 def _n_results(model: Model) -> int:
@@ -322,9 +315,10 @@ class _Recorder:
     def _kept(self, lane: int, n_rows: int) -> np.ndarray:
         from mc_engine.store.histories import rows_to_keep
 
-        table = self._history[lane * self._n_fields : (lane + 1) * self._n_fields, :n_rows]
-        table[1 : 1 + self._factors.size] /= self._factors[:, np.newaxis]
-        return table.take(rows_to_keep(table.T, self._rows), axis=1)
+        lines = slice(lane * self._n_fields, (lane + 1) * self._n_fields)
+        kept = self._history[lines].take(rows_to_keep(self._history, self._rows, lines, n_rows), axis=1)
+        kept[1 : 1 + self._factors.size] /= self._factors[:, np.newaxis]
+        return kept
 
     def _recorded(self, chosen: np.ndarray) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
         """((time, status, states, metrics) in SI, number of rows of each case), the rows recorded where they fit."""

@@ -13,12 +13,15 @@ from typing import Any
 import numpy as np
 
 from mc_engine.errors import EngineError
+from mc_engine.model.record import Model
+from mc_engine.status import STATUS_NAME
 from mc_engine.store.case_rows import RowLog
 
 NOMINAL_NOISE = 2**52  # the nominal draws its noise where no case does
 Columns = dict[str, np.ndarray]
 Inputs = Mapping[str, Any]
 Process = Popen[str]
+_STATUS_WORDS = np.array([STATUS_NAME[code] for code in range(len(STATUS_NAME))], dtype=object)
 
 
 class RunStopped(EngineError):
@@ -34,6 +37,7 @@ class Flyer(ABC):
 
     batch : cases that fly together, of which one may end the worker of all.
     histories_together : cases whose histories fly together.
+    chunks_per_worker : in a run, at least: enough for an even end, few enough that parts stay large.
     keeps_rows : a case may take long, so the row of each is recorded when it is complete, and a run that is stopped
         does not wait for the cases in flight.
     most_workers : that may fly cases of this campaign at a time, as licences allow; None for any number.
@@ -42,6 +46,7 @@ class Flyer(ABC):
 
     batch: int
     histories_together: int = 1
+    chunks_per_worker: int = 8
     keeps_rows: bool = False
     most_workers: int | None = None
     tolerance: float | None = None
@@ -111,3 +116,17 @@ class Flyer(ABC):
     def lost_number(self, inputs: Inputs, noise: int, results: Columns, who: str) -> str:
         """Where a number of a failed flight became infinite or NaN, as a sentence; empty where that is not known."""
         return ""
+
+
+def status_words(status: np.ndarray) -> np.ndarray:
+    """object[n] of str, not to be written to: of cases that all ended alike it is one word seen n times."""
+    if status.size and (status == status[0]).all():
+        return np.broadcast_to(_STATUS_WORDS[[int(status[0])]], status.shape)
+    return _STATUS_WORDS[status.astype(int)]
+
+
+def phase_words(model: Model, numbers: np.ndarray) -> np.ndarray:
+    """object[n] of str, the names of the phases with these numbers; empty for NaN and in a model without phases."""
+    words = np.array([*model.phases, ""], dtype=object)
+    known = np.isfinite(numbers) & bool(model.phases)
+    return words[np.where(known, np.nan_to_num(numbers), -1).astype(int)]

@@ -1,6 +1,6 @@
 """Tables of saved time histories: case_id, t_s, the model's outputs with units, and the phase; which rows they hold."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from mc_engine.errors import StoreError
+from mc_engine.model.designs import compiled_loop
 from mc_engine.shell_words import shell_word
 from mc_engine.store import parts
 from mc_engine.store.parts import CASE_COLUMNS, Column, Part
@@ -18,15 +19,15 @@ if TYPE_CHECKING:
 _EVEN = 0.2  # share of the rows that lie evenly in time, so that no quiet stretch is left without
 _EDGE = 1e-2  # of the range of a quantity: a smaller jump is no edge
 _MOST_EDGES = 2  # times as many as the rows that are asked for
-_BLOCK = 2**16  # numbers that are gone through together
 _TINY = np.finfo(float).tiny
 
 
-def rows_to_keep(table: np.ndarray, rows: int) -> np.ndarray:
+def rows_to_keep(record: np.ndarray, rows: int, lines: slice = slice(None), n_rows: int | None = None) -> np.ndarray:
     """Indices of the rows of a recorded flight that its history holds, ascending: int64[n_kept].
 
-    table : float64[n, 1 + n_quantities], the time, not falling, and the quantities.  Rows of one time are one instant:
-        two before and after a sample of the control, three or more before and after an event.
+    record : float64[n_lines, n], contiguous; a column is a row of the history.  lines : of this flight, the time, not
+        falling, and its quantities; by default all.  n_rows : recorded; by default n.  Rows of one time are one
+        instant: two before and after a sample of the control, three or more before and after an event.
     rows : how many are kept.  The first and the last are, both sides of every event, and both sides of the samples at
         which a quantity jumps by more than a hundredth of its range: up to twice `rows` of them, the largest.  The rest
         lie where straight lines between them err most, a fifth evenly in time; they are half of `rows` at least, on top
@@ -36,13 +37,17 @@ def rows_to_keep(table: np.ndarray, rows: int) -> np.ndarray:
     The density of the rest is that of C. de Boor, A Practical Guide to Splines, 1978, chapter XII: the square root of
     the second derivative, here of the quantity that bends most in units of its range.
     """
-    columns = table.T
-    left = np.flatnonzero(_changes(columns))
+    first, stop, _ = lines.indices(len(record))
+    times = record[first, :n_rows]
+    repeats, count = np.arange(1, times.size), np.full(1, times.size - 1)
+    _repeats(record, first, stop, repeats, count)
+    left = np.delete(np.arange(times.size), repeats[: count[0]])
     if left.size <= rows:
         return left
-    t = columns[0, left]
-    errors, jumps = _errors_and_jumps(t, columns[1:], left)
-    always = _at_events(columns[0])[left] | _at_edges(jumps, rows)
+    t, ranges = times[left], _ranges(record[first + 1 : stop, :n_rows])
+    errors, jumps = np.zeros(t.size), np.zeros(t.size - 1)
+    _errors_and_jumps(record, first + 1, *ranges, left, t, np.empty(t.size), np.empty(t.size), errors, jumps)
+    always = _at_events(times)[left] | _at_edges(jumps, rows)
     always[0] = always[-1] = True
     bend = np.sqrt(errors)
     density = (1.0 - _EVEN) * bend / max(bend.cumsum()[-1], _TINY)
@@ -54,62 +59,59 @@ def rows_to_keep(table: np.ndarray, rows: int) -> np.ndarray:
     return left[always]
 
 
-def _blocks(columns: np.ndarray) -> Iterator[np.ndarray]:
-    """Some quantities at a time: a processor takes several times longer over numbers that it cannot keep near."""
-    size = max(1, _BLOCK // columns.shape[1])
-    for first in range(0, len(columns), size):
-        yield columns[first : first + size]
+@compiled_loop
+def _repeats(record, first, stop, rows, count):
+    """Of some rows, those that are as the one before in all lines; not a number equals its like.
+
+    rows : int64[n], after the call those in front.  count : int64[1], how many there are.
+    """
+    n = count[0]
+    for line in range(first, stop):
+        found = 0
+        for k in range(n):
+            before, after = record[line, rows[k] - 1], record[line, rows[k]]
+            rows[found] = rows[k]
+            found += after == before or (after != after and before != before)
+        n = found
+    count[0] = n
 
 
-def _changes(columns: np.ndarray) -> np.ndarray:
-    """Mask of the first row and of those that differ from the one before; not a number equals its like."""
-    changes = np.zeros(columns.shape[1], dtype=bool)
-    changes[:1] = True
-    for block in _blocks(columns):
-        after, before = block[:, 1:], block[:, :-1]
-        differ = after != before
-        if np.isnan(block.min()):
-            differ &= (after == after) | (before == before)
-        changes[1:] |= differ.any(axis=0)
-    return changes
+def _ranges(quantities: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Half of the least and half of the largest number of each quantity, of those that are finite; halved, so that no
+    difference is above the largest number.  Without any, inf and -inf."""
+    low, high = quantities.min(axis=1), quantities.max(axis=1)
+    for line in np.flatnonzero(~(np.isfinite(low) & np.isfinite(high))):
+        numbers = quantities[line, np.isfinite(quantities[line])]
+        low[line], high[line] = numbers.min(initial=np.inf), numbers.max(initial=-np.inf)
+    return 0.5 * low, 0.5 * high
 
 
-def _errors_and_jumps(t: np.ndarray, quantities: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+@compiled_loop
+def _errors_and_jumps(record, first, low, high, left, t, share, values, errors, jumps):
     """Of the rows that are left: how far the straight line between the neighbours errs, and how far, without the first,
     it jumps from the one before at the same time; in the quantity where most, in units of its range.
 
-    quantities : float64[n_quantities, n], of all rows.
+    Numbers that are not finite count as 0, as those of a quantity without a range.
+    first : line of the first quantity.  low, high : see `_ranges`.  t : float64[n_left], times of the rows.
+    share, values : float64[n_left], to work in.  errors : float64[n_left], jumps : float64[n_left - 1], 0 at first.
     """
-    errors, jumps = np.zeros(t.size), np.zeros(t.size - 1)
-    width = t[2:] - t[:-2]
-    share = (t[1:-1] - t[:-2]) / np.where(width > 0.0, width, 1.0)
-    for block in _blocks(quantities):
-        values = _in_ranges(block.take(left, axis=1) if left.size < block.shape[1] else block)
-        chord = values[:, 2:] - values[:, :-2]
-        chord *= share
-        chord += values[:, :-2]
-        chord -= values[:, 1:-1]
-        np.maximum(errors[1:-1], np.abs(chord, out=chord).max(axis=0), out=errors[1:-1])
-        change = values[:, 1:] - values[:, :-1]
-        np.maximum(jumps, np.abs(change, out=change).max(axis=0), out=jumps)
-    jumps[t[1:] != t[:-1]] = 0.0
-    return errors, jumps
-
-
-def _in_ranges(values: np.ndarray) -> np.ndarray:
-    """Quantities in units of their ranges; 0 where one is not finite or constant.  float64[n_quantities, n]."""
-    values = 0.5 * values  # halved, so that no range is above the largest number
-    low, high = values.min(axis=1, keepdims=True), values.max(axis=1, keepdims=True)
-    finite: Any = np.isfinite(low) & np.isfinite(high)
-    if not finite.all():
-        finite = np.isfinite(values)
-        low = np.where(finite, values, np.inf).min(axis=1, keepdims=True)
-        high = np.where(finite, values, -np.inf).max(axis=1, keepdims=True)
-    varies = high > low
-    with np.errstate(invalid="ignore"):
-        values -= np.where(varies, low, 0.0)
-        values /= np.where(varies, high - low, 1.0)
-    return values if finite.all() and varies.all() else np.where(finite & varies, values, 0.0)
+    n = left.size
+    for k in range(1, n - 1):
+        width = t[k + 1] - t[k - 1]
+        share[k] = (t[k] - t[k - 1]) / (width if width > 0.0 else 1.0)
+    for line in range(low.size):
+        least, size = low[line], high[line] - low[line]
+        if not size > 0.0:
+            continue
+        for k in range(n):
+            value = 0.5 * record[first + line, left[k]]
+            values[k] = (value - least) / size if -np.inf < value < np.inf else 0.0
+        for k in range(1, n - 1):
+            error = abs((values[k + 1] - values[k - 1]) * share[k] + values[k - 1] - values[k])
+            errors[k] = error if error > errors[k] else errors[k]
+        for k in range(n - 1):
+            jump = abs(values[k + 1] - values[k]) if t[k + 1] == t[k] else 0.0
+            jumps[k] = jump if jump > jumps[k] else jumps[k]
 
 
 def _at_events(t: np.ndarray) -> np.ndarray:

@@ -9,6 +9,10 @@ from mc_engine.store.histories import rows_to_keep
 T = np.linspace(0.0, 100.0, 20_001)
 
 
+def by_lines(table):
+    return np.ascontiguousarray(table.T)
+
+
 def error(table, kept):
     """How far straight lines between the kept rows err, in the units of the quantity."""
     return np.abs(np.interp(table[:, 0], table[kept, 0], table[kept, 1]) - table[:, 1]).max()
@@ -16,7 +20,7 @@ def error(table, kept):
 
 def test_rows_lie_where_the_quantity_bends_and_straight_lines_between_them_err_ten_times_less():
     table = np.column_stack([T, np.tanh((T - 60.0) * 4.0)])
-    kept = rows_to_keep(table, 100)
+    kept = rows_to_keep(by_lines(table), 100)
     assert len(kept) == 100
     assert (kept[0], kept[-1]) == (0, len(T) - 1)
     even = np.linspace(0, len(T) - 1, 100).round().astype(int)
@@ -30,7 +34,7 @@ def test_both_sides_of_the_largest_jumps_are_kept_on_top_of_half_the_rows():
     table = np.column_stack([np.repeat(T, 2), np.repeat(held**2 * (-1.0) ** held, 2)])
     table[0::2, 1] = np.append(table[0, 1], table[1:-1:2, 1])  # before the sample: what the last one left
     for rows, first in ((1000, 8), (20, 60)):  # the smaller jumps: under a hundredth of the range, beyond 40 of them
-        kept = rows_to_keep(table, rows)
+        kept = rows_to_keep(by_lines(table), rows)
         t, command = table[kept].T
         for second in range(first + 1, 101):
             before, after = np.flatnonzero(t == second)
@@ -41,30 +45,30 @@ def test_both_sides_of_the_largest_jumps_are_kept_on_top_of_half_the_rows():
 
 def test_three_rows_of_one_time_are_an_event_which_is_kept_though_nothing_jumps():
     t = np.sort(np.append(T, [33.335, 33.335, 33.335]))
-    kept = rows_to_keep(np.column_stack([t, np.sin(t)]), 10)
+    kept = rows_to_keep(np.array([t, np.sin(t)]), 10)
     assert 33.335 in t[kept]
-    assert 33.335 not in T[rows_to_keep(np.column_stack([T, np.sin(T)]), 10)]
+    assert 33.335 not in T[rows_to_keep(np.array([T, np.sin(T)]), 10)]
 
 
 def test_what_is_not_a_number_or_never_changes_takes_no_row_from_the_rest():
     table = np.column_stack([T, np.tanh(T - 60.0), np.full(T.size, np.nan), np.full(T.size, 7.0)])
     table[5000:, 2] = 1.0
-    assert (rows_to_keep(table, 50) == rows_to_keep(table[:, :2], 50)).all()
-    assert rows_to_keep(table[:40], 50).tolist() == list(range(40))
+    assert (rows_to_keep(by_lines(table), 50) == rows_to_keep(by_lines(table[:, :2]), 50)).all()
+    assert rows_to_keep(by_lines(table[:40]), 50).tolist() == list(range(40))
 
 
-def test_the_rows_are_the_same_however_many_quantities_are_gone_through_together(monkeypatch):
+def test_rows_are_chosen_among_those_of_a_flight_beside_others_by_machine_code_as_by_python(monkeypatch):
     """Edges, an event, repeated rows, a constant and what is not a number, each in a quantity of its own."""
-    t = np.sort(np.append(np.repeat(T[::4], 2), T[10_000]))
+    t = np.sort(np.append(np.repeat(T[::20], 2), T[10_000]))
     edges, held = np.floor(t) % 7.0, np.where(np.arange(t.size) % 2 == 0, np.ceil(t / 10.0), np.floor(t / 10.0))
-    lost = np.where(t > 80.0, np.nan, np.cos(t))
-    table = np.column_stack([t, np.sin(t), edges, held, lost, np.full(t.size, 3.0), np.where(t == 10.0, np.inf, t)])
-    kept = {}
-    for numbers in (1, 3 * t.size, 2**30):
-        monkeypatch.setattr(histories, "_BLOCK", numbers)
-        kept[numbers] = rows_to_keep(table, 60).tolist()
-        by_columns = np.ascontiguousarray(table.T).T  # as flights record them
-        assert rows_to_keep(by_columns, 60).tolist() == kept[numbers]
-    assert T[10_000] in t[kept[1]]  # the event
-    assert (np.diff(t[kept[1]]) == 0.0).sum() > 5  # edges
-    assert kept[1] == kept[3 * t.size] == kept[2**30]
+    lost, huge = np.where(t > 80.0, np.nan, np.cos(t)), 1.7e308 * np.sin(0.3 * t)
+    flight = [t, np.sin(t), edges, held, lost, huge, np.full(t.size, 3.0), np.where(t == 10.0, np.inf, t)]
+    record = np.full((2 + len(flight) + 3, t.size + 50), 1.0) * np.arange(t.size + 50)
+    record[2:-3, : t.size] = flight
+    kept = rows_to_keep(record, 60, slice(2, -3), t.size).tolist()
+    assert T[10_000] in t[kept]  # the event
+    assert (np.diff(t[kept]) == 0.0).sum() > 5  # edges
+    assert kept == rows_to_keep(np.array(flight), 60).tolist()
+    for name in ("_repeats", "_errors_and_jumps"):
+        monkeypatch.setattr(histories, name, getattr(histories, name).__wrapped__)
+    assert kept == rows_to_keep(record, 60, slice(2, -3), t.size).tolist()
