@@ -29,6 +29,7 @@ TRIPLE = "nvptx64-nvidia-cuda"
 CAPABILITIES = (80, 90, 100)  # of the cards whose code is written: Ampere, Hopper, Blackwell; later cards run these
 OLDEST = CAPABILITIES[0]
 _UNROUNDED = re.compile(r"^\s*((?:add|sub|mul|fma|mad|div|sqrt|rcp)(?:\.\w+)*?\.f(?:32|64))\b", re.MULTILINE)
+_REMARK = re.compile(r"[ \t]*//.*")  # counts the calls that a process has written: the driver keeps code by its text
 ENTRY = "mc_engine_fly"
 PER_CASE = (0, 4, -7, -6, -5, -4)  # of a kernel's arguments: parameters, cases; time, status, state, metrics
 HISTORY, STATUS = -3, -6
@@ -247,7 +248,7 @@ def ptx_of(ir: str, capability: int) -> str:
         release = ".".join(map(str, llvm.llvm_version_info))
         raise EngineError(f"LLVM {release} wrote {loose[0]} without a rounding, which a card may contract; another "
                           "release of llvmlite is needed")  # fmt: skip
-    return text
+    return _REMARK.sub("", text)
 
 
 @lru_cache(maxsize=1)

@@ -26,13 +26,12 @@ from mc_engine.store.parts import CASE_COLUMNS, Column, Part, Written, read_part
 from mc_engine.store.run_files import NOMINAL_CASE
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 64, 32_768
-CHUNKS_PER_WORKER = 8  # enough for an even end, few enough that parts stay large
 Guard = Callable[[np.ndarray], AbstractContextManager[None]]
 
 
-def chunk_size(cases: int, workers: int) -> int:
+def chunk_size(cases: int, workers: int, chunks_per_worker: int = Flyer.chunks_per_worker) -> int:
     """How many cases a worker flies at a time, and a part holds, by default."""
-    return min(max(-(-cases // (CHUNKS_PER_WORKER * workers)), SMALLEST_CHUNK), LARGEST_CHUNK)
+    return min(max(-(-cases // (chunks_per_worker * workers)), SMALLEST_CHUNK), LARGEST_CHUNK)
 
 
 def chunks_of(ranges: Iterable[tuple[int, int]], size: int) -> Iterator[tuple[int, int]]:

@@ -103,25 +103,31 @@ def memory_can_be_limited() -> bool:
 
 # ---- whether a card is faster than the processor
 
+_FIRST_TRIAL, _LONG_ENOUGH = 1024, 0.25  # cases; s: to begin threads takes some milliseconds
+
 
 def measure_card(campaign: Campaign, n_cases: int | None = None, repeats: int = 3) -> tuple[float, float]:
     """Cases per second on all cores of the processor and on a card, which the backend "auto" goes by from now on.
 
-    n_cases : of a flight; by default those of the largest part of a run.  The fastest of `repeats` flights counts.
-    Raises EngineError, one sentence, where there is no card.
+    n_cases : of a flight; by default so many that all cores fly for a while, or all cases of a design that has no more.
+    The fastest of `repeats` flights counts.  Raises EngineError, one sentence, where there is no card.
     """
     from mc_engine.runner.cards import CardFlyer
 
-    file = _measurement_of(campaign)
-    most = n_cases if n_cases is not None and is_endless(campaign) else campaign.cases
-    ids = np.arange(min(n_cases or LARGEST_CHUNK, most), dtype=np.int64)
-    table, workers = case_table(campaign, ids), os.cpu_count() or 1
+    file, workers = _measurement_of(campaign), os.cpu_count() or 1
+    most = n_cases or LARGEST_CHUNK * workers
+    most = most if is_endless(campaign) else min(most, campaign.cases)
 
-    def flight(flyer: Flyer) -> Callable[[], object]:
-        return lambda: fly_in_threads(campaign, table, ids, ["status"], workers, flyer)
+    def seconds(flyer: Flyer, cases: int, repeats: int) -> float:
+        ids = np.arange(cases, dtype=np.int64)
+        table = case_table(campaign, ids)
+        return _shortest(lambda: fly_in_threads(campaign, table, ids, ["status"], workers, flyer), repeats)
 
-    flyers = flyer_of(campaign), CardFlyer(campaign)
-    processor, card = (ids.size / _shortest(flight(flyer), repeats) for flyer in flyers)
+    on_processor, on_card = flyer_of(campaign), CardFlyer(campaign)
+    cases = most if n_cases else min(_FIRST_TRIAL, most)
+    while cases < most and seconds(on_processor, cases, 1) < _LONG_ENOUGH:
+        cases = min(2 * cases, most)
+    processor, card = (cases / seconds(flyer, cases, repeats) for flyer in (on_processor, on_card))
     with disk_errors(file):
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps({"processor_cases_s": processor, "card_cases_s": card}), encoding="utf-8")

@@ -216,8 +216,12 @@ def _card_kernel(model: Model, folder: Path | None, width: int) -> Callable[...,
 
 
 class CardFlyer(CompiledFlyer):
-    """A compiled model, one case a thread.  Time histories fly on the processor."""
+    """A compiled model, one case a thread.  Time histories fly on the processor.
 
+    A card flies thousands of cases in the time of one, so the chunks are as large as they may be.
+    """
+
+    chunks_per_worker = 1
     _width = 1
     _build = staticmethod(_card_kernel)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from mc_engine.campaign.cases import full_inputs
 from mc_engine.campaign.loading import Campaign
-from mc_engine.flight.chunks import CHUNKS_PER_WORKER, drawn
+from mc_engine.flight.chunks import drawn
 from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import in_threads
@@ -47,7 +47,7 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
     flyer = flyer_of(campaign)
     workers = min(workers, flyer.most_workers or workers)
     together = flyer.histories_together
-    size = together * max(1, -(-len(saved) // (CHUNKS_PER_WORKER * workers * together)))
+    size = together * max(1, -(-len(saved) // (flyer.chunks_per_worker * workers * together)))
     pieces = [[NOMINAL_CASE]] if _saves_nominal(store, campaign, _DANGEROUS) else []
     pieces += [saved[first : first + size] for first in range(0, len(saved), size)]
     flown = in_threads(lambda piece: _histories_of(campaign, flyer, piece, stopped), pieces, workers)

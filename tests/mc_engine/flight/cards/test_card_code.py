@@ -82,6 +82,21 @@ def test_the_code_is_the_same_in_every_process():
     assert not re.search(r"_ZN|x7f[0-9a-f]{10}", ptx)
 
 
+CALLS = f"""
+target triple = "{TRIPLE}"
+declare double @other(double)
+define double @caller(double %x) {{
+  %y = call double @other(double %x)
+  ret double %y
+}}
+"""
+
+
+def test_what_a_process_wrote_before_does_not_show():
+    """LLVM numbers the calls that it has written in a remark."""
+    assert ptx_of(CALLS, CAPABILITIES[0]) == ptx_of(CALLS, CAPABILITIES[0])
+
+
 def test_the_code_is_made_once_and_kept(monkeypatch):
     call, code = code_of("minimal")
     monkeypatch.setattr(call.func, "compiled", lambda form: pytest.fail("was compiled again"))

@@ -1,6 +1,7 @@
 """Runs with `--backend cuda`, from the command line to the case table, with a stand-in for the driver.
 
-Not run on a card.  The stand-in keeps the driver's rules, and flies the very code that a card is given.
+The stand-in keeps the driver's rules, and flies the very code that a card is given.  One test, marked slow, flies every
+shipped campaign on the card of this machine, where there is one.
 """
 
 import inspect
@@ -42,6 +43,13 @@ def _found_anew():
     cards.opened.cache_clear()
 
 
+def has_card():
+    try:
+        return bool(cards.cards())
+    except EngineError:
+        return False
+
+
 def parts(store):
     """What the store has of its cases: range, bytes and statuses of each part."""
     return sorted((part.first, part.stop, part.sha256, str(part.status)) for part in store.parts)
@@ -64,6 +72,16 @@ def test_a_run_on_cards_has_the_bytes_of_one_on_the_processor(name, tmp_path, mo
     assert parts(on_cards) == parts(on_processor)
     counts = on_cards.status_counts()
     assert sum(map(sum, fake.launches)) >= sum(counts.values()) - counts.get("refused", 0)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not has_card(), reason="there is no NVIDIA card here")
+@pytest.mark.parametrize("name", NAMES)
+def test_a_run_on_the_card_of_this_machine_has_the_bytes_of_one_on_the_processor(name, tmp_path):
+    campaign = few_cases(name)
+    on_card = runner.run(campaign, tmp_path / "card", backend="cuda", chunk=CHUNK)
+    on_processor = runner.run(campaign, tmp_path / "processor", chunk=CHUNK)
+    assert parts(on_card) == parts(on_processor)
 
 
 def test_the_command_line_flies_on_a_card(tmp_path, monkeypatch):
