@@ -7,18 +7,18 @@ from mc_engine.model import load_model
 
 
 class ModelFlights:
-    """A model with its nominal inputs, flown with one seed.  width : cases at a time;  rows : of a history."""
+    """A model with its nominal inputs, flown with one seed, as wide as a run.  rows : of a history."""
 
-    def __init__(self, name, seed=1, width=8, rows=2001):
+    def __init__(self, name, seed=1, rows=2001):
         self.model = load_model(name)
         self.nominal = {item.name: item.default for item in (*self.model.parameters, *self.model.settings)}
-        self._seed, self._width, self._rows = seed, width, rows
+        self._seed, self._rows = seed, rows
 
     def cases(self, width=None, ids=None, **inputs):
         """Columns of as many cases as the longest input has values."""
         n_cases = max((np.size(value) for value in inputs.values()), default=1)
         ids = np.arange(n_cases) if ids is None else ids
-        return fly(self.model, self.nominal | inputs, ids, self._seed, width=width or self._width)
+        return fly(self.model, self.nominal | inputs, ids, self._seed, width=width)
 
     def one(self, **inputs):
         """The row of one case: a number or a word by column name."""

@@ -5,7 +5,7 @@ import numpy as np
 from tests.campaigns.model_flights import ModelFlights
 
 SEED = 20160421
-FLIGHTS = ModelFlights("campaigns.deorbit", SEED, width=None, rows=3000)
+FLIGHTS = ModelFlights("campaigns.deorbit", SEED, rows=3000)
 MODEL, NOMINAL = FLIGHTS.model, FLIGHTS.nominal
 fly_cases, fly_one, history = FLIGHTS.cases, FLIGHTS.one, FLIGHTS.history
 

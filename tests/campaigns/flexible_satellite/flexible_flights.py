@@ -53,4 +53,4 @@ def fly_campaign(name, n_cases):
     campaign = load_campaign(FOLDER / name)
     ids = np.arange(n_cases)
     inputs = full_inputs(campaign, case_table(campaign, ids))
-    return fly(campaign.model, inputs, ids, campaign.seed, width=8)
+    return fly(campaign.model, inputs, ids, campaign.seed)

@@ -64,7 +64,7 @@ def random_case(number):
     return case | {"rate_used": ["inertial", "orbital"][number % 2], "pwpf_pairing": "ABC"[number % 3]}
 
 
-@pytest.mark.parametrize("number", range(4))
+@pytest.mark.parametrize("number", [0, 1, *(pytest.param(number, marks=pytest.mark.slow) for number in (2, 3))])
 def test_a_random_case_with_an_ideal_actuator_flies_like_its_slow_twin(number):
     assert gaps(random_case(number) | SLOW_SAMPLES) == {}
 
@@ -90,7 +90,7 @@ def test_pulses_may_act_as_their_mean_over_a_sample():
 
 def test_every_width_of_the_build_has_the_bits_of_the_others():
     case = NOMINAL | random_case(4) | PULSED | {"rate_noise_rad_s": 1e-4, "disturbance_draw": "sample"}
-    wide, alone = (fly(MODEL, case, np.array([17]), SEED, width=width) for width in (8, 1))
+    wide, alone = (fly(MODEL, case, np.array([17]), SEED, width=width) for width in (None, 1))
     for name, column in wide.items():
         np.testing.assert_array_equal(column, alone[name], err_msg=name)
 
@@ -102,10 +102,10 @@ def test_a_case_has_the_same_bits_among_others_of_every_kind():
         "valve_delay_s": np.array([0.0, 0.0, 0.007, 0.0]),
         "dbar_n_m": np.array([0.0, 0.0, 0.0, 1e-3]),
     }
-    together = fly(MODEL, NOMINAL | PULSED | mixed, np.arange(4), SEED, width=8)
+    together = fly(MODEL, NOMINAL | PULSED | mixed, np.arange(4), SEED)
     for case in range(4):
         own = {name: column[case] for name, column in mixed.items()}
-        alone = fly(MODEL, NOMINAL | PULSED | own, np.array([case]), SEED, width=8)
+        alone = fly(MODEL, NOMINAL | PULSED | own, np.array([case]), SEED)
         for name, column in alone.items():
             np.testing.assert_array_equal(together[name][case], column[0], err_msg=name)
 

@@ -10,7 +10,7 @@ from campaigns.geo_injection.design.kept_programs import SEQUENCES
 from campaigns.geo_injection.design.staged import Orbit, staged
 from tests.campaigns.model_flights import ModelFlights
 
-FLIGHTS = ModelFlights("campaigns.geo_injection", width=None)
+FLIGHTS = ModelFlights("campaigns.geo_injection")
 MODEL, NOMINAL = FLIGHTS.model, FLIGHTS.nominal
 fly_cases, fly_one, history = FLIGHTS.cases, FLIGHTS.one, FLIGHTS.history  # by column name, in declared units
 GEO, PARKING = 42_164_137.0, 6_578_137.0

@@ -13,7 +13,7 @@ fly_cases, fly_one, history = FLIGHTS.cases, FLIGHTS.one, FLIGHTS.history
 IDEAL = TEXTBOOK | {"shape": "flat", "gravity": "none"}
 
 
-def assert_same_bits_alone(together, picked, width=8, each=(), **inputs):
+def assert_same_bits_alone(together, picked, width=None, each=(), **inputs):
     """The picked cases have the bits of their rows among the others where each flies alone.
 
     each : input -> a value for every case;  inputs : what all cases share.
