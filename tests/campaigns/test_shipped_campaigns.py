@@ -31,15 +31,17 @@ def test_every_dispersion_and_requirement_of_a_shipped_campaign_has_its_source()
 
 
 ELLIPTIC = {"initial_inclination_deg": 46.0, "parking_eccentricity": 0.2, "parking_argument_of_perigee_deg": 20.0}
+DESIGNED = pytest.mark.deep  # a program of burns, or a reference: it takes seconds
 PLACES = ("sun_moon", "reference")  # parameters that say where in the tables of all these cases a case's own begin
 
 
 @pytest.mark.parametrize(
     ("model", "n", "given"),
     [("campaigns.deorbit", 40, {}), ("campaigns.flexible_satellite", 40, {}), ("campaigns.geo_servicing", 12, {}),
-     ("campaigns.geo_injection", 200, {}), ("campaigns.geo_injection", 40, ELLIPTIC),
+     ("campaigns.geo_injection", 200, {}), pytest.param("campaigns.geo_injection", 40, ELLIPTIC, marks=DESIGNED),
      ("campaigns.reentry.autopilot", 40, {}),
-     ("campaigns.reentry", 12, {"vehicle": "given", "guidance": "law3", "entry_radius_km": 0.0})],
+     pytest.param("campaigns.reentry", 12, {"vehicle": "given", "guidance": "law3", "entry_radius_km": 0.0},
+                  marks=DESIGNED)],
 )  # fmt: skip
 def test_what_is_prepared_for_a_case_has_the_same_bits_alone_and_among_others(model, n, given):
     """Every parameter is off its nominal value, those too that no shipped campaign disperses: NumPy's sums of

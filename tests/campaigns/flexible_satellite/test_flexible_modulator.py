@@ -141,7 +141,15 @@ def wandering(n, seed):
     return np.clip(np.cumsum(np.random.default_rng([20221012, seed]).normal(0.0, 0.15, n)), -0.9, 0.9)
 
 
-@pytest.mark.parametrize(("period", "n"), [(0.005, 40), (0.03, 40), (0.2, 40), (0.5, 16), (2.0, 8)])
+@pytest.mark.parametrize(
+    ("period", "n"),
+    [
+        (0.005, 40),
+        (0.03, 40),
+        (0.2, 40),
+        *(pytest.param(*more, marks=pytest.mark.slow) for more in ((0.5, 16), (2.0, 8))),
+    ],
+)
 def test_under_any_held_command_the_samples_are_those_of_the_integrated_lag(period, n):
     """Up to 37 switches in a sample; each axis for itself."""
     commands = np.array([wandering(n, int(1000 * period)), wandering(n, 7), np.full(n, 0.53)])

@@ -35,7 +35,7 @@ SEQUENCES = [
     {"method": "staged", "initial_inclination_deg": 1.0},
     {"final_inclination_deg": 28.5, "initial_inclination_deg": 5.0},
     ELLIPTIC,
-    ELLIPTIC | {"final_inclination_deg": 10.0},
+    pytest.param(ELLIPTIC | {"final_inclination_deg": 10.0}, marks=pytest.mark.slow),
     ELLIPTIC | {"parking_altitude_km": 800.0},
     {"method": "staged", "parking_eccentricity": 0.1},
 ]

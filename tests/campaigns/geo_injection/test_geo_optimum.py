@@ -40,10 +40,10 @@ def test_the_hamiltonian_is_zero_along_every_arc_and_thrust_pays_exactly_where_i
 
 def test_two_burns_of_a_weak_thrust_are_told_from_an_optimum():
     """Within the long first burn thrust does not pay: two burns in its place save propellant."""
-    two = solution(2, 60.0, 5e3)
+    two = solution(2, 0.0, 5e3)
     assert not is_optimal(two)
     assert arcs(two)[0].switching.max() > 1e-3
-    assert is_optimal(solution(3, 60.0, 5e3))
+    assert is_optimal(solution(3, 0.0, 5e3))
 
 
 def test_the_first_burn_is_about_the_ascending_node():
@@ -55,7 +55,16 @@ def test_the_first_burn_is_about_the_ascending_node():
 
 # Corners and middle of the range that is promised.
 @pytest.mark.parametrize("burns", [2, 3])
-@pytest.mark.parametrize(("inclination", "thrust"), [(0.1, 4e4), (60.0, 4e4), (3.0, 1e4), (60.0, 5e3), (0.0, 5e3)])
+@pytest.mark.parametrize(
+    ("inclination", "thrust"),
+    [
+        (60.0, 4e4),
+        (0.0, 5e3),
+        pytest.param(60.0, 5e3, marks=pytest.mark.slow),
+        pytest.param(0.1, 4e4, marks=pytest.mark.slow),
+        pytest.param(3.0, 1e4, marks=pytest.mark.slow),
+    ],
+)
 def test_it_converges_from_0_to_60_degrees_and_from_5_to_40_kilonewtons(burns, inclination, thrust):
     best = solution(burns, inclination, thrust)
     assert elements(best.states[-1]) == pytest.approx((42_164.137, 0.0, 0.0), abs=1e-6)
@@ -86,7 +95,10 @@ def assert_is_an_optimum(burns, inclination, thrust):
     return used_kg(best)
 
 
-@pytest.mark.parametrize(("inclination", "thrust"), list(points(6, 4))[2:])
+STEEP, NEARLY_PLANAR = list(points(6, 4))[2:]
+
+
+@pytest.mark.parametrize(("inclination", "thrust"), [pytest.param(*STEEP, marks=pytest.mark.slow), NEARLY_PLANAR])
 def test_two_and_three_burns_are_optima_where_the_range_is_sampled(inclination, thrust):
     two, three = (assert_is_an_optimum(burns, inclination, thrust) for burns in (2, 3))
     assert three < two
@@ -105,7 +117,7 @@ def test_hardly_a_point_of_the_range_has_no_optimum_and_then_it_is_said():
     assert len(failed) <= 2, failed
 
 
-@pytest.mark.parametrize("thrust", [7000.0, 5000.0])
+@pytest.mark.parametrize("thrust", [pytest.param(7000.0, marks=pytest.mark.slow), 5000.0])
 def test_weak_thrust_comes_back_to_the_first_perigee_and_waits_for_no_revolution(thrust):
     """Planar, three burns: growing the added burn at the wanted thrust led back to the propellant of two burns."""
     assert assert_is_an_optimum(3, 0.0, thrust) < 0.985 * used_kg(solution(2, 0.0, thrust))

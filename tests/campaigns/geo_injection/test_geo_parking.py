@@ -26,7 +26,7 @@ def test_the_best_two_impulses_from_a_circle_are_those_at_the_node():
 
 
 ELLIPSES = [
-    (2, {"inclination_deg": 46.0, "e": 0.2, "perigee_deg": 20.0}),
+    pytest.param(2, {"inclination_deg": 46.0, "e": 0.2, "perigee_deg": 20.0}, marks=pytest.mark.slow),
     (3, {"inclination_deg": 28.5, "e": 0.25, "perigee_deg": 170.0, "altitude_km": 500.0}),
     pytest.param(2, {"inclination_deg": 0.0, "e": 0.4, "perigee_deg": 77.0, "thrust": 8000.0}, marks=pytest.mark.slow),
 ]
@@ -52,6 +52,7 @@ def test_a_planar_ellipse_costs_the_same_wherever_its_perigee_is():
     assert here == pytest.approx(there, abs=1e-4)
 
 
+@pytest.mark.slow  # the ellipse with three burns has its perigee near that node
 def test_a_perigee_on_the_descending_node_is_used_there():
     """The mirror image of the perigee on the ascending node."""
     ascending, descending = (optimum(parked(2, 28.5, e=0.1, perigee_deg=angle).problem()) for angle in (0.0, 180.0))
