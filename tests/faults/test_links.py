@@ -66,7 +66,7 @@ def use_store(run):
         store.write_histories(store.histories())
 
 
-@pytest.mark.parametrize("kind", MADE)
+@pytest.mark.parametrize("kind", ["run", pytest.param("tuning", marks=pytest.mark.slow), "rare event"])
 def test_no_writer_follows_a_link_at_any_name_and_verify_names_it(whole, tmp_path, kind):
     names = sorted(path.relative_to(whole[kind]).as_posix() for path in whole[kind].rglob("*"))
     inner = [name for name in names if not name.endswith(".lock")]
@@ -141,27 +141,34 @@ def test_names_lead_nowhere_but_into_the_directory(tmp_path, monkeypatch, holds_
     assert names_in(root, "in") == ["a"]
 
 
+@pytest.fixture(scope="module")
+def failed(tmp_path_factory):
+    """The run of a simulator of which case 3 fails."""
+    folder = tmp_path_factory.mktemp("failed")
+    file = python_campaign(folder / "ball", cases=8, fault="if case.id == 3: raise ValueError('once more')")
+    return runner.run(load_campaign(file), folder / "run", workers=1).path
+
+
 @pytest.mark.parametrize(
     "name",
     ["simulator", pytest.param("simulator/case-0000003", marks=pytest.mark.slow), "simulator/case-0000003/case.json"],
 )
-def test_what_a_simulator_leaves_behind_stays_in_the_run(tmp_path, name):
-    file = python_campaign(tmp_path / "ball", cases=8, fault="if case.id == 3: raise ValueError('once more')")
-    store, outside = runner.run(load_campaign(file), tmp_path / "run", workers=1), tmp_path / "outside"
-    kept = contents(store.path / "simulator")
+def test_what_a_simulator_leaves_behind_stays_in_the_run(failed, tmp_path, name):
+    run, outside = copied(failed, tmp_path / "run"), tmp_path / "outside"
+    kept = contents(run / "simulator")
     assert [*kept] == ["case-0000003/case.json"]
-    (store.path / name).rename(outside)
-    (store.path / name).symlink_to(outside)
+    (run / name).rename(outside)
+    (run / name).symlink_to(outside)
     theirs = contents(outside) if outside.is_dir() else outside.read_bytes()
     if name == "simulator":
-        assert damage(store.path) == ["simulator: is no folder of this run's own"]
+        assert damage(run) == ["simulator: is no folder of this run's own"]
         with pytest.raises(StoreError, match="simulator: is a symbolic link"):
-            runner.rerun(store.path)
+            runner.rerun(run)
         with pytest.raises(StoreError, match="simulator: is a symbolic link"):
-            runner.extend(store.path, 16, workers=1)
+            runner.extend(run, 16, workers=1)
     else:
-        runner.rerun(store.path)
-        assert contents(store.path / "simulator") == kept  # in a new folder, or a new file
+        runner.rerun(run)
+        assert contents(run / "simulator") == kept  # in a new folder, or a new file
     assert (contents(outside) if outside.is_dir() else outside.read_bytes()) == theirs
 
 

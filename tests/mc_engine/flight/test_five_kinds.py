@@ -12,7 +12,7 @@ from tests.mc_engine.flight.ball_fmu import fmu_campaign
 from tests.mc_engine.flight.falling_ball import CAMPAIGN, assert_alike, program_campaign, python_campaign
 
 pytest.importorskip("fmpy", reason='the extra "fmu" is missing')
-CASES = 200
+CASES = 40
 METRICS = ["fall_time_s", "impact_speed_m_s"]
 MODEL = """
 from mc_engine.lanes import physics

@@ -138,7 +138,7 @@ def test_results_are_read_from_a_csv_or_by_patterns_over_stdout(tmp_path, flown)
         assert np.allclose(table["impact_speed_m_s"], flown.cases()["impact_speed_m_s"][:8], rtol=1e-12, atol=0.0)
 
 
-@pytest.mark.parametrize(("slots", "most"), [(1, 1), (2, 2)])
+@pytest.mark.parametrize(("slots", "most"), [pytest.param(1, 1, marks=pytest.mark.slow), (2, 2)])
 def test_no_more_cases_fly_at_a_time_than_there_are_slots(tmp_path, slots, most):
     marks = tmp_path / "marks"
     marks.mkdir()
@@ -158,7 +158,10 @@ def test_no_more_cases_fly_at_a_time_than_there_are_slots(tmp_path, slots, most)
     assert table["fall_time_s"].max() == most
 
 
-@pytest.mark.parametrize(("keep", "kept"), [("all", 12), ("failed", 1), ("none", 0)])
+# what "failed" keeps, as where nothing is said, is also looked at in test_simulators.py and tests/faults/test_links.py
+@pytest.mark.parametrize(
+    ("keep", "kept"), [("all", 12), pytest.param("failed", 1, marks=pytest.mark.slow), ("none", 0)]
+)
 def test_folders_of_cases_are_kept_as_asked(tmp_path, keep, kept):
     fault = "(case.folder / 'deck.inp').write_text('10')\nif case.id == 7: raise ValueError('no')"
     file = python_campaign(tmp_path / "ball", cases=12, fault=fault, options=f'keep="{keep}",')
