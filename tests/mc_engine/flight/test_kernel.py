@@ -241,6 +241,7 @@ def test_a_cache_that_cannot_be_is_named_with_its_variable(tmp_path, monkeypatch
         speed(tmp_path, "model.py")
 
 
+@pytest.mark.slow  # copies of a campaign and other processes are in test_kernel_key.py and above
 def test_the_same_campaign_under_the_same_relative_path_elsewhere_flies_from_the_cache(tmp_path):
     script = """
 from pathlib import Path

@@ -158,8 +158,15 @@ LOST = {
 GUIDANCE = "from mc_engine.lanes import log, physics\n\n\n@physics\ndef lag(t):\n    return 0.1 * log(1.0 - t)\n"
 
 
-@pytest.mark.parametrize("clock", ["fixed", "adaptive"])
-@pytest.mark.parametrize("where", LOST)
+# adaptive, too, where the step looks at what is lost: at events, and at what the control and an event leave behind
+STEPPED = ("in the control, and used later", "in the function of an event", "in what an event does")
+
+
+@pytest.mark.parametrize(
+    ("where", "clock"),
+    [(where, "fixed") for where in LOST]
+    + [pytest.param(where, "adaptive", marks=() if where in STEPPED else pytest.mark.slow) for where in LOST],
+)
 def test_the_place_is_the_first_one_wherever_the_number_was_lost(where, clock, tmp_path):
     edits, text, sentence = LOST[where]
     (tmp_path / "guidance.py").write_text(GUIDANCE)
@@ -205,7 +212,7 @@ WHOLE = [
 ROCKETS = {"rocket": [SHORT], "adaptive rocket": [SHORT, ADAPTIVE, ADAPTED]}
 
 
-@pytest.mark.parametrize("name", ["minimal", *ROCKETS, *WHOLE])
+@pytest.mark.parametrize("name", ["minimal", "adaptive rocket", pytest.param("rocket", marks=pytest.mark.slow), *WHOLE])
 def test_an_interpreted_flight_has_the_bits_of_the_kernel(name, tmp_path):
     campaign = rocket(tmp_path, *ROCKETS[name]) if name in ROCKETS else load_campaign(name)
     inputs = full_inputs(campaign, {key: value[0] for key, value in case_table(campaign, np.array([3])).items()})

@@ -113,7 +113,7 @@ MIXED = {
 }
 
 
-@pytest.mark.parametrize("width", [1, 16])
+@pytest.mark.parametrize("width", [1, pytest.param(16, marks=pytest.mark.slow)])
 def test_cases_with_events_keep_their_bytes_at_every_width(width):
     eight = flown(RAIL, **MIXED)
     assert {"ok", "no-stop"} <= set(eight["status"])

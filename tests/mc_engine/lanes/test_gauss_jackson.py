@@ -137,7 +137,7 @@ def added(total, change):
 
 @pytest.mark.parametrize(
     ("order", "width"),
-    [(6, 8), (9, 1), pytest.param(6, 1, marks=pytest.mark.slow), pytest.param(9, 8, marks=pytest.mark.slow)],
+    [(6, 8), *(pytest.param(*more, marks=pytest.mark.slow) for more in ((9, 1), (6, 1), (9, 8)))],
 )
 def test_a_plain_loop_over_python_floats_gives_the_same_bits(order, width):
     columns = flown(by(OSCILLATOR, f"gj{order}"), width=width, seed=9, **MIXED)

@@ -90,7 +90,7 @@ class AdamsSteps:
 
 @pytest.mark.parametrize(
     ("order", "width"),
-    [(8, 1), (11, 8), pytest.param(8, 8, marks=pytest.mark.slow), pytest.param(11, 1, marks=pytest.mark.slow)],
+    [(11, 8), *(pytest.param(*more, marks=pytest.mark.slow) for more in ((8, 1), (8, 8), (11, 1)))],
 )
 def test_a_plain_loop_over_python_floats_gives_the_same_bits(order, width):
     columns = flown(by(OSCILLATOR, f"abm{order}"), width=width, seed=9, **MIXED)

@@ -13,11 +13,15 @@ from mc_engine.flight.interpreted import InterpretedFlight
 from mc_engine.model import load_model
 
 
-@pytest.mark.parametrize("method", ["abm11", "gj8"])
-def test_a_case_keeps_its_bytes_at_every_width_in_any_order_among_any_cases(method):
+@pytest.mark.parametrize(
+    ("method", "widths"),
+    [("abm11", (1, 16)), ("gj8", (1,)), pytest.param("gj8", (16,), marks=pytest.mark.slow)],
+    ids=["abm11", "gj8", "gj8 wide"],
+)
+def test_a_case_keeps_its_bytes_at_every_width_in_any_order_among_any_cases(method, widths):
     model = by(OSCILLATOR, method)
     whole = flown(model, **MIXED)
-    for width in (1, 16):
+    for width in widths:
         same_bytes(whole, flown(model, width=width, **MIXED))
     order = np.random.default_rng(1).permutation(21)
     shuffled = {name: value[order] if np.ndim(value) else value for name, value in MIXED.items()}
@@ -133,7 +137,7 @@ def test_each_bounce_of_a_bead_comes_at_its_time_and_with_its_height(method):
     assert columns["gates"].tolist() == [1.0, 0.0]
 
 
-@pytest.mark.parametrize("method", ["abm11", "gj8"])
+@pytest.mark.parametrize("method", [pytest.param("abm11", marks=pytest.mark.slow), "gj8"])
 def test_cases_with_events_keep_their_bytes_at_every_width(method):
     n = 30
     random = np.random.default_rng(11)

@@ -87,7 +87,17 @@ def test_control_is_sampled_in_its_own_phase_alone(inputs, whole):
 
 
 @pytest.mark.parametrize(
-    ("width", "chunk", "threads"), [pytest.param(1, 5, 1, marks=pytest.mark.slow), (8, 1, 2), (16, 7, 2)]
+    ("model", "width", "chunk", "threads"),
+    [
+        ("phased_rocket", 8, 1, 2),
+        ("phased_rocket", 16, 7, 2),
+        pytest.param("phased_rocket", 1, 5, 1, marks=pytest.mark.slow),
+        ("phased_rocket_adaptive", 8, 1, 2),
+        pytest.param("phased_rocket_adaptive", 16, 7, 2, marks=pytest.mark.slow),
+        pytest.param("phased_rocket_adaptive", 1, 5, 1, marks=pytest.mark.slow),
+    ],
+    indirect=["model"],
+    scope="module",
 )
 def test_bytes_depend_on_no_width_chunk_thread_or_order(model, inputs, whole, width, chunk, threads):
     cases = np.random.default_rng(width).permutation(N_CASES)

@@ -15,7 +15,9 @@ from mc_engine.model import load_model
 DELAYS = np.array([0.0, 0.25, 1.0, 3.5, 7.75, 0.1])
 
 
-@pytest.fixture(scope="module", params=["FixedStep(0.5, 10.0)", "AdaptiveStep(10.0)"])
+@pytest.fixture(
+    scope="module", params=["FixedStep(0.5, 10.0)", pytest.param("AdaptiveStep(10.0)", marks=pytest.mark.slow)]
+)
 def model(request, tmp_path_factory):
     """The legs with each kind of clock."""
     folder = tmp_path_factory.mktemp("legs")

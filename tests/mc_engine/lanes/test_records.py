@@ -90,6 +90,16 @@ def text(request):
     return text.replace("Event, FixedStep", "AdaptiveStep, Event, FixedStep")
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param(
+            "FixedStep(0.1, 2.0, control_every=5)", marks=pytest.mark.slow
+        ),  # as in model/test_declarations.py
+        "AdaptiveStep(2.0, control_period=0.5)",
+    ],
+    indirect=True,
+)
 def test_a_discrete_state_may_hold_records(text, tmp_path):
     (tmp_path / "kept.py").write_text(text)
     model, lifts = load_model("kept.py", tmp_path), np.array([0.0, 3.0, 20.0])

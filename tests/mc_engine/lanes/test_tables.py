@@ -10,9 +10,10 @@ from mc_engine.model import load_model
 
 SHELF = load_model("shelf.py", FOLDER)
 PLACES = np.array([0.0, 7.0, 49.0, 3.0, 3.0, 20.0, 1.0, 48.0, 11.0, 30.0])
+WIDTHS = [1, 8, pytest.param(16, marks=pytest.mark.slow)]
 
 
-@pytest.mark.parametrize("width", [1, 8, 16])
+@pytest.mark.parametrize("width", WIDTHS)
 def test_every_lane_finds_the_number_of_its_own_place(width):
     columns = flown(SHELF, place=PLACES, width=width)
     assert columns["end_x_m"].tolist() == pytest.approx((PLACES**2).tolist(), rel=1e-14)
@@ -27,7 +28,7 @@ def test_cases_of_other_settings_have_other_tables():
     assert columns["last"].tolist() == (scales * 49.0**2).tolist()
 
 
-@pytest.mark.parametrize("width", [1, 8, 16])
+@pytest.mark.parametrize("width", WIDTHS)
 def test_a_place_outside_is_the_nearest_one_inside_and_what_is_no_number_breaks_the_flight(width):
     columns = flown(SHELF, place=np.array([-5.0, 1e9, np.pi, -200.0, 1e300]), width=width)
     assert columns["end_x_m"].tolist() == pytest.approx([0.0, 2401.0, 9.0, 0.0, 2401.0])

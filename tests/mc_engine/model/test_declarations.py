@@ -304,6 +304,7 @@ def test_events_may_share_a_function_that_gives_a_number_for_each(tmp_path):
     assert "`events` gives Crossings(later, apogee); it must give a record with" in found
 
 
+@pytest.mark.slow  # test_model_contract.py has `check` fly such a model
 def test_events_may_share_a_function_that_gives_one_number(tmp_path):
     both = ('"falling", "stop")}', '"falling", "stop"), "rise": Event(climb, "rising", "stop", rare=True)}')
     plain, shared = flown(tmp_path / "plain"), flown(tmp_path / "both", both)

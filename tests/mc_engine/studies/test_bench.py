@@ -23,7 +23,7 @@ def minimal():
     return load_campaign("minimal")
 
 
-@pytest.mark.parametrize("width", [1, 16])
+@pytest.mark.parametrize("width", [1, pytest.param(16, marks=pytest.mark.slow)])
 def test_the_timed_kernel_flies_the_cases_of_a_run(minimal, width):
     ids = np.arange(21)
     inputs = full_inputs(minimal, case_table(minimal, ids))
