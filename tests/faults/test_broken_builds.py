@@ -28,11 +28,13 @@ def test_kills_find_a_store_that_counts_a_part_before_it_is_there(tmp_path, name
         test_killed_runs.check_kills(tmp_path, kills=60, seed=1, broken=(name,))
 
 
+@pytest.mark.slow
 def test_deaths_of_workers_find_a_runner_that_forgets_their_chunks(tmp_path):
     with pytest.raises(RED, match="flies the rest"):  # and exit status 4
         test_worker_deaths.check_kills(tmp_path, "loky", seed=1, kills=1, cases=500, broken="dead_worker_forgotten")
 
 
+@pytest.mark.slow
 def test_deadly_cases_find_a_runner_that_blames_their_neighbours(tmp_path):
     with pytest.raises(RED, match=r"\[(32, 33|40, 41), .*\] == \[40\]"):  # sixteen, or eight, fly at a time
         test_worker_deaths.check_isolated(tmp_path, 100, [40], "loky", broken="suspects_given_up")

@@ -189,13 +189,19 @@ def test_campaigns_that_take_their_inputs_from_one_another_are_refused(tmp_path)
 
 
 DANGERS = re.compile(r"\b(pickle|marshal|shelve|dill|cloudpickle|yaml)\b")
+WORDS = re.compile(
+    rf"{DANGERS.pattern}|\b(eval|exec|compile|__import__|allow_pickle)\b"
+)  # without one, no syntax is read
 
 
 def test_no_source_reads_pickles_or_turns_text_into_code():
     root = Path(mc_engine.__file__).resolve().parents[1]
     dangerous = []
     for path in [*root.glob("mc_engine/**/*.py"), *root.glob("reports/**/*.py"), *root.glob("campaigns/**/*.py")]:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        text = path.read_text(encoding="utf-8")
+        if text.isascii() and not WORDS.search(text):
+            continue
+        for node in ast.walk(ast.parse(text)):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             called = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""

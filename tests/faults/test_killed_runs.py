@@ -66,7 +66,7 @@ def _chunks_lost(run, table):
     return len(set(begun(run)) - kept)
 
 
-@pytest.mark.parametrize("kills", [1, 6, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kills", [1, *(pytest.param(kills, marks=pytest.mark.slow) for kills in (6, 200))])
 def test_a_killed_run_loses_a_chunk_per_worker_at_most_and_is_resumed_to_the_same_bytes(
     tmp_path, kills, record_property
 ):

@@ -27,7 +27,7 @@ def remove(run, moved):
 @pytest.mark.parametrize(
     ("backend", "happen", "signals"),
     [
-        ("threading", rename, 0),
+        pytest.param("threading", rename, 0, marks=pytest.mark.slow),
         ("loky", rename, 0),
         pytest.param("threading", rename, 2, marks=pytest.mark.slow),
         pytest.param("loky", remove, 0, marks=pytest.mark.slow),

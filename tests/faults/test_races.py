@@ -17,7 +17,7 @@ from mc_engine import open_store
 from mc_engine.runner import runner
 
 CASES, CHUNK = 400, 40
-LONG = 4000
+LONG = 1600
 WITHOUT_LOCKS = """
 import errno, fcntl
 
@@ -139,7 +139,7 @@ def test_of_two_runs_in_one_directory_one_is_refused_and_the_other_is_whole(tmp_
 
 @pytest.fixture(scope="module")
 def long_run(tmp_path_factory):
-    """The folder of a campaign, its unbroken run of a hundred parts, and the bytes of that."""
+    """The folder of a campaign, its unbroken run of forty parts, and the bytes of that."""
     folder = tmp_path_factory.mktemp("long")
     whole = runner.run(stones(folder / "campaign", LONG), folder / "whole", workers=2, chunk=CHUNK).path
     return folder / "campaign", whole, results(whole)
@@ -219,7 +219,7 @@ def delete_lock(run):
     (run / ".lock").unlink(missing_ok=True)
 
 
-SOME = [2, pytest.param(20, marks=pytest.mark.slow)]
+SOME = [1, pytest.param(20, marks=pytest.mark.slow)]
 
 
 @pytest.mark.parametrize("count", SOME)

@@ -64,7 +64,7 @@ def assert_gone(processes):
     ("backend", "send"),
     [
         ("loky", lambda process: os.killpg(process.pid, signal.SIGINT)),
-        ("threading", lambda process: os.killpg(process.pid, signal.SIGTERM)),
+        pytest.param("threading", lambda process: os.killpg(process.pid, signal.SIGTERM), marks=pytest.mark.slow),
         pytest.param("loky", lambda process: os.killpg(process.pid, signal.SIGTERM), marks=pytest.mark.slow),
         pytest.param("dask", lambda process: os.killpg(process.pid, signal.SIGINT), marks=pytest.mark.slow),
         pytest.param("dask", lambda process: os.kill(process.pid, signal.SIGTERM), marks=pytest.mark.slow),

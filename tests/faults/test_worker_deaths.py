@@ -101,7 +101,7 @@ def check_kills(folder, backend, seed, kills, cases, broken=""):
     ("backend", "kills", "cases"),
     [
         ("loky", 1, 400),
-        ("loky", 5, 1500),
+        pytest.param("loky", 5, 1500, marks=pytest.mark.slow),
         pytest.param("loky", 100, 30_000, marks=pytest.mark.slow),
         pytest.param("dask", 30, 9_000, marks=pytest.mark.slow),
     ],
@@ -199,7 +199,7 @@ def test_a_case_that_takes_too_long_and_one_that_eats_its_memory_are_given_up(tm
     ("backend", "trap", "seconds", "end"),
     [
         ("loky", 1, None, ["worker-died", "the process flying this case died"]),
-        ("loky", 2, 3.0, ["time-limit", "took longer than 3 s"]),
+        pytest.param("loky", 2, 3.0, ["time-limit", "took longer than 3 s"], marks=pytest.mark.slow),
         pytest.param("dask", 2, 3.0, ["time-limit", "took longer than 3 s"], marks=pytest.mark.slow),
     ],
 )
