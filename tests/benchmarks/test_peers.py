@@ -19,7 +19,8 @@ def told(contest):
     return results
 
 
-@pytest.mark.parametrize("key", ["orbit", *(pytest.param(key, marks=pytest.mark.slow) for key in OTHERS)])
+@pytest.mark.slow
+@pytest.mark.parametrize("key", ["orbit", *OTHERS])
 def test_engine_and_scipy_reach_the_same_millimetre_of_a_flight_in_80_bits(key):
     problem = problems.BY_KEY[key]()
     entrants = [engine.entrant(problem, "DOP853"), scipy_peer.entrant(problem)]

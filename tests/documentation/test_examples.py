@@ -52,8 +52,14 @@ def test_the_workflow_fails_on_a_broken_requirement_and_on_a_change():
 
 
 @pytest.mark.parametrize("name", ARRAYS)
-def test_the_job_array_flies_and_resumes_its_pieces_to_one_run(tmp_path, name):
+def test_the_shell_reads_the_job_array_without_a_word(name):
     assert subprocess.run(["bash", "-n", EXAMPLES / name], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name == "job_array_pbs.sh" else ()) for name in ARRAYS]
+)
+def test_the_job_array_flies_and_resumes_its_pieces_to_one_run(tmp_path, name):
     script, text = tmp_path / "job_array.sh", (EXAMPLES / name).read_text()
     for line, ours in (("CAMPAIGN=my_case", "small"), ("PIECES=20", "2"), ("WORKERS=16", "1")):
         text = text.replace(line, f"{line.split('=')[0]}={ours}")

@@ -179,6 +179,7 @@ def test_a_pod_that_does_not_reach_the_store_flies_nothing(tmp_path, store):
     assert not (pod.work / "shard").exists()
 
 
+@pytest.mark.slow  # the same array flies without a store in test_examples.py, and pods fly over one above
 def test_the_slurm_array_keeps_its_pieces_on_the_store_from_which_they_are_merged(tmp_path, store):
     source = campaign_folder(tmp_path / "stones", CASES)
     url, text = f"{store}/slurm", ARRAY

@@ -110,6 +110,7 @@ def test_tables_are_written_between_the_marks_only(tmp_path):
         tables.written_into(page, "| new |")
 
 
+@pytest.mark.slow
 def test_the_processes_of_a_cluster_are_told_apart_and_every_part_is_counted(tmp_path):
     campaign = plain("minimal", CASES)
     with cluster_of(2) as cluster:
@@ -121,6 +122,7 @@ def test_the_processes_of_a_cluster_are_told_apart_and_every_part_is_counted(tmp
     assert not any(process.is_running() for process in (*cluster.workers, cluster.scheduler))
 
 
+@pytest.mark.slow  # tests/faults/test_backends.py has a cluster lose a worker
 def test_a_run_that_loses_half_of_its_workers_loses_no_row_and_flies_one_part_a_worker_again(tmp_path):
     result = recovery(4, plain("minimal", CASES), tmp_path, CHUNK)
     assert (result.killed, result.lost, result.doubled, result.equal) == (2, 0, 0, True)

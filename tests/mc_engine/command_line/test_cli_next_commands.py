@@ -156,7 +156,7 @@ def commands_in(text):
 
 
 @posix
-@pytest.mark.parametrize("name", ["r s/1", "deorbit"])
+@pytest.mark.parametrize("name", ["r s/1", pytest.param("deorbit", marks=pytest.mark.slow)])
 def test_the_command_that_flies_a_missing_shard_can_be_given_as_it_stands(here, name):
     shutil.copytree(SHIPPED / "minimal", here / "mine")
     flight = ("run", "mine", "--cases", "30", "--no-report")

@@ -44,7 +44,10 @@ def user_time(script, folder):
     return float(done.stdout.split()[-1])
 
 
-@pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["check", "--help"]])
+@pytest.mark.parametrize(
+    "words",
+    [["run", "--help"], *(pytest.param(words, marks=pytest.mark.slow) for words in (["--help"], ["check", "--help"]))],
+)
 def test_help_takes_hardly_longer_than_python_takes_to_load_some_of_its_own_library(tmp_path, words):
     """0.7 to 1.2 times as long, 100 ms on a quiet machine; numpy or pydantic alone would add 0.6 of it."""
     script = f"from mc_engine.command_line.commands import app\ntry: app({words})\nexcept SystemExit: pass"

@@ -26,7 +26,9 @@ def p_values(k, seed, paired, together, shift=0.0):
     return change.shift_p, change.spread_p
 
 
-@pytest.mark.parametrize(("paired", "together"), [(False, 0.0), (True, 0.0), (True, 0.7)])
+@pytest.mark.parametrize(
+    ("paired", "together"), [(False, 0.0), pytest.param(True, 0.0, marks=pytest.mark.slow), (True, 0.7)]
+)
 def test_of_a_hundred_comparisons_a_shift_of_three_tenths_of_sigma_is_found_in_99_and_one_gives_a_false_alarm_at_most(
     monkeypatch, paired, together
 ):

@@ -74,8 +74,17 @@ def covered(surface, noise, n, campaigns):
     return np.mean(inside), neighbours
 
 
-@pytest.mark.parametrize("noise", [1e-3, 0.1, 0.5])
-@pytest.mark.parametrize("kind", SURFACES)
+OFTEN = [("waves", noise) for noise in (1e-3, 0.1, 0.5)] + [(kind, 0.5) for kind in SURFACES] + [("cone", 1e-3)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "noise"),
+    [
+        pytest.param(kind, noise, marks=() if (kind, noise) in OFTEN else pytest.mark.slow)
+        for kind in SURFACES
+        for noise in (1e-3, 0.1, 0.5)
+    ],
+)
 def test_two_errors_hold_the_true_surface_whatever_it_is(kind, noise):
     # nominal 95 %; places of one map err together, so that three campaigns scatter by some percent
     share, _ = covered(SURFACES[kind], noise, 2000, campaigns=3)
@@ -98,7 +107,7 @@ def test_too_few_cases_give_no_map(n):
     assert map_metric(x, y, quadratic(x, y)) is None
 
 
-@pytest.mark.parametrize("noise", [1e-3, 0.1, 0.5])
+@pytest.mark.parametrize("noise", [1e-3, *(pytest.param(noise, marks=pytest.mark.slow) for noise in (0.1, 0.5))])
 def test_neighbourhoods_that_are_left_out_as_far_too_wide_would_not_have_been_chosen(monkeypatch, noise):
     draw = np.random.Generator(np.random.Philox(key=3))
     x, y = draw.normal(size=(2, 2000))

@@ -151,7 +151,7 @@ def test_both_drawings_hold_what_the_table_says(drawn):
     assert words.startswith("Success probability in bins of single inputs. force: ")
 
 
-@pytest.mark.parametrize("cases", [0, 1, 2, 60])
+@pytest.mark.parametrize("cases", [0, 1, pytest.param(2, marks=pytest.mark.slow), 60])
 def test_few_failed_and_equal_cases_are_drawn_or_said(cases):
     lost = {"status": "not-finite", **{name: np.nan for name in ("propellant_kg", "peak_force_n", "settling_time_s")}}
     for change in ({}, lost, {"ve_pct": 0.0, "oe_pct": 0.0}, {"propellant_kg": np.nan}, {"propellant_kg": 2.0}):

@@ -155,11 +155,17 @@ def test_chosen_cases_have_points_and_no_regions():
     ("change", "said"),
     [
         (lambda table: table.assign(status="not-finite"), "none of 50 cases has an impact point."),
-        (lambda table: table.assign(latitude_deg=np.nan), "none of 50 cases has an impact point."),
+        pytest.param(
+            lambda table: table.assign(latitude_deg=np.nan), "none of 50 cases has an impact point.",
+            marks=pytest.mark.slow,
+        ),
         (lambda table: table.assign(end_altitude_km=99.0), "an impact point; 49 ended above 30\u202fkm."),
         (lambda table: table.assign(latitude_deg=1.0, longitude_deg=2.0), "impact points lie within one metre"),
         (lambda table: table.head(1), "No regions: they need three impact points, and there are 1."),
-        (lambda table: table.head(2), "No regions: they need three impact points, and there are 2."),
+        pytest.param(
+            lambda table: table.head(2), "No regions: they need three impact points, and there are 2.",
+            marks=pytest.mark.slow,
+        ),
         (lambda table: table.assign(latitude_deg=0.0), "impact points lie on a line."),
         (lambda table: table.assign(latitude_deg=0.0, longitude_deg=7.2 * table["case_id"]), "too far apart"),
         (lambda table: table.drop(columns="latitude_deg"), "not drawn; the run has no column latitude_deg."),

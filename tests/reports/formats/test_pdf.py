@@ -21,10 +21,10 @@ from reports.document.columns import spans
 MARKUP = [
     '#panic("x")',
     "*bold* _x_ $x^2$ `raw`",
-    "= heading",
-    "@reference <label>",
-    "\\ \\u{41} // comment",
-    "$\\frac{",
+    *(
+        pytest.param(markup, marks=pytest.mark.slow)
+        for markup in ("= heading", "@reference <label>", "\\ \\u{41} // comment", "$\\frac{")
+    ),
 ]
 
 

@@ -87,7 +87,7 @@ def test_only_a_count_over_all_requirements_is_said_to_be_inside_all_limits():
     )
 
 
-@pytest.mark.parametrize("cases", [0, 1, 2, 60])
+@pytest.mark.parametrize("cases", [0, 1, pytest.param(2, marks=pytest.mark.slow), 60])
 def test_few_failed_and_equal_cases_are_drawn_or_said(cases):
     for change in ({}, {"status": "not-finite"}, {"angle_deg": -2.0, "speed_m_s": 7800.0}, {"peak_load_g": np.nan}):
         run = landing_run(60, failed=0)

@@ -215,6 +215,9 @@ def test_the_data_have_the_joint_verdict_and_the_kind_of_bounds(design, looks, b
     assert (told["name"], told["metric"], told["verdict"]) == ("all at once", "", joint.outcome)
     assert (told["passed"], told["tried"], told["required_probability"]) == (joint.passed, 1000, joint.share)
     assert (told["demonstrated_probability"], told["failing"]) == (joint.lower, list(joint.failing))
+
+
+def test_the_data_of_a_single_requirement_have_no_joint_verdict():
     alone = build(synthetic_run(100, 0, campaign=mc(100), requirements=[FUEL]), "run")
     assert json.loads(render_json(alone))["joint"] is None
 

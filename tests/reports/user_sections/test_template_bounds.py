@@ -18,7 +18,13 @@ def run():
     return synthetic_run(200)
 
 
-@pytest.mark.parametrize("bomb", BOMBS)
+# further examples of depth and of memory
+FURTHER = ("500 parentheses", "a wide format of another kind", "a centred word")
+
+
+@pytest.mark.parametrize(
+    "bomb", [pytest.param(bomb, marks=pytest.mark.slow if bomb in FURTHER else ()) for bomb in BOMBS]
+)
 def test_a_template_without_measure_gets_a_sentence(tmp_path, monkeypatch, run, bomb):
     monkeypatch.setattr(user_sections, "LONGEST_S", 3.0)
     text, words = BOMBS[bomb]
