@@ -40,7 +40,12 @@ SMALL = {
 }
 
 
-@pytest.mark.parametrize("case", SMALL)
+FURTHER = ("numbers of 1e160", "numbers that no square tells from 0")
+
+
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=pytest.mark.slow if case in FURTHER else ()) for case in SMALL]
+)
 def test_the_report_says_so_in_every_format(case):
     run, said = SMALL[case]
     document = build(run, "run")

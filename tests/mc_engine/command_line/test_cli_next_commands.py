@@ -172,7 +172,7 @@ def test_the_command_that_flies_a_missing_shard_can_be_given_as_it_stands(here, 
 
 
 @posix
-@pytest.mark.parametrize("name", ["a c", "-dash", "it's $HOME; ls"])
+@pytest.mark.parametrize("name", [pytest.param("a c", marks=pytest.mark.slow), "-dash", "it's $HOME; ls"])
 def test_a_command_that_is_named_can_be_given_as_it_stands_whatever_the_folder_is_called(here, name):
     assert call("run", "minimal", "--cases", 20, "--out", f"./{name}", "--no-report").exit_code == 0
     run = Path(name)
