@@ -4,7 +4,7 @@
     python -m tests.benchmarks.card_code reentry/autopilot
 
 Bytes are of one thread: a card keeps what finds no register in memory of its own.  It needs ptxas, of the package
-nvidia-cuda-nvcc-cu12.  The numbers say nothing of speed.
+nvidia-cuda-nvcc-cu12.  `card_speed` measures times on a card.
 """
 
 import re

@@ -1,6 +1,6 @@
 """The code of a card's threads: the processor's operations, no more and no fewer roundings, and the same bits.
 
-None of this was run on a card.  Held here: the code assembles for each kind of card, holds no contracted operation, and
+Held without a card: the code assembles for each kind of card, holds no contracted operation, and
 compiled for the processor gives the bits of the engine's own kernel.
 """
 
