@@ -20,12 +20,14 @@ from typer.testing import CliRunner
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.command_line.commands import app
 from mc_engine.errors import CampaignError, EngineError, ModelError
+from mc_engine.flight.card_code import PER_CASE
 from mc_engine.flight.flight import fly
 from mc_engine.lanes.compiler import compile_kernel
 from mc_engine.lanes.kernel_cache import Kernel
 from mc_engine.model import load_model
 from mc_engine.runner import backends, cards, runner
 from mc_engine.runner.backends import Backend
+from tests.benchmarks import card_speed
 from tests.mc_engine.flight.falling_ball import python_campaign
 
 CASES, CHUNK = 96, 40
@@ -162,6 +164,22 @@ def test_auto_takes_a_card_that_was_measured_to_be_faster(speeds, tmp_path, monk
     fake.launches[0].clear()
     runner.run(shipped("minimal", cases=CASES), tmp_path / "run", backend="auto")
     assert bool(fake.launches[0]) == (speeds[1] > speeds[0])
+
+
+def test_the_benchmark_of_cards_names_the_results_that_differ(monkeypatch, capsys):
+    install(monkeypatch, FakeDriver())
+    monkeypatch.setattr(card_speed, "in_processes", lambda function, items: [function(item) for item in items])
+    card_speed.tables(CASES, 1.0, ["minimal"])
+    assert f"| minimal | {CASES} | 10 | none |" in capsys.readouterr().out
+    fly = cards.Card.fly
+
+    def fly_wrong(card, code, arguments):
+        fly(card, code, arguments)
+        arguments[PER_CASE[-1]][0, -1] += 1.0
+
+    monkeypatch.setattr(cards.Card, "fly", fly_wrong)
+    card_speed.tables(CASES, 1.0, ["minimal"])
+    assert f"| minimal | {CASES} | 10 | apogee_altitude_km |" in capsys.readouterr().out
 
 
 def test_a_simulator_flies_on_the_processor(tmp_path, monkeypatch):
