@@ -41,8 +41,8 @@ Weather = namedtuple("Weather", "density density_slope east east_slope north nor
 
 
 def node_altitudes(depth: np.ndarray) -> np.ndarray:
-    """float64[n, NODES] [m] for the depths of the lowest nodes, float64[n] in [0, 1) spacings."""
-    return SPACING * (np.arange(NODES) - depth[:, None])
+    """float64[NODES, n] [m] for the depths of the lowest nodes, float64[n] in [0, 1) spacings."""
+    return SPACING * (np.arange(NODES)[:, None] - depth)
 
 
 def standard_profile(column: int, altitudes: np.ndarray) -> np.ndarray:
@@ -51,12 +51,12 @@ def standard_profile(column: int, altitudes: np.ndarray) -> np.ndarray:
 
 
 def normal_deviates(draw: np.ndarray, count: int) -> np.ndarray:
-    """float64[n, count]: independent standard normal deviates that belong to each number `draw` in [0, 1).
+    """float64[count, n]: independent standard normal deviates that belong to each number `draw` in [0, 1).
 
     SplitMix64 counts on from the number: G. L. Steele, D. Lea, C. H. Flood, OOPSLA (2014) 453-472.
     """
-    key = (draw * 2.0**53).astype(np.uint64)[:, None]
-    z = (key << np.uint64(11)) + np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    key = (draw * 2.0**53).astype(np.uint64)
+    z = (key << np.uint64(11)) + np.arange(1, count + 1, dtype=np.uint64)[:, None] * np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     z = z ^ (z >> np.uint64(31))
@@ -64,12 +64,12 @@ def normal_deviates(draw: np.ndarray, count: int) -> np.ndarray:
 
 
 def gauss_markov(deviates: np.ndarray, length: float) -> np.ndarray:
-    """float64[n, NODES] without unit, of variance 1 and correlation exp(-distance / length), from as many deviates."""
+    """float64[NODES, n] without unit, of variance 1 and correlation exp(-distance / length), from as many deviates."""
     a = np.exp(-SPACING / length)
-    out = np.empty_like(deviates)
-    out[:, 0] = deviates[:, 0]
+    out = np.sqrt(1.0 - a * a) * deviates
+    out[0] = deviates[0]
     for k in range(1, NODES):
-        out[:, k] = a * out[:, k - 1] + np.sqrt(1.0 - a * a) * deviates[:, k]
+        out[k] += a * out[k - 1]
     return out
 
 
@@ -78,20 +78,20 @@ def weather_nodes(draw: np.ndarray, density_size, wind_size, mean_size) -> np.nd
 
     draw : in [0, 1), 0 for no random part;  density_size, wind_size, mean_size : multiples of the magnitudes above
     """
-    sizes = np.where(draw > 0.0, 1.0, 0.0) * np.array([density_size, wind_size, wind_size])
+    sizes = np.where(draw > 0.0, np.sqrt(0.5), 0.0) * np.array([density_size, wind_size, wind_size])
     out = np.empty((draw.size, LENGTH))
     for first in range(0, draw.size, BLOCK):
         block = slice(first, first + BLOCK)
         deviates = normal_deviates(draw[block], 2 * DEPTH + 1)
-        depth = np.where(draw[block] > 0.0, scipy.special.ndtr(deviates[:, -1]), 0.0)
-        altitudes, each = node_altitudes(depth), deviates[:, :-1].reshape(-1, FIELDS, 2, NODES)
+        depth = np.where(draw[block] > 0.0, scipy.special.ndtr(deviates[-1]), 0.0)
+        altitudes, each = node_altitudes(depth), deviates[:-1].reshape(FIELDS, 2, NODES, -1)
+        density, wind, mean = (standard_profile(column, altitudes) for column in (1, 2, 3))
         nodes = out[block, :DEPTH].reshape(-1, NODES, FIELDS)  # a view
-        for field, column in enumerate((1, 2, 2)):
+        for field, profile in enumerate((density, wind, wind)):
             # the sum of the two scales, half of the variance each
-            both = gauss_markov(each[:, field, 0], SMALL_SCALE) + gauss_markov(each[:, field, 1], LARGE_SCALE)
-            size = np.sqrt(0.5) * sizes[field, block, None]
-            nodes[:, :, field] = size * both * standard_profile(column, altitudes)
-        nodes[:, :, 1] += np.asarray(mean_size)[block, None] * standard_profile(3, altitudes)
+            both = gauss_markov(each[field, 0], SMALL_SCALE) + gauss_markov(each[field, 1], LARGE_SCALE)
+            nodes[:, :, field] = (sizes[field, block] * both * profile).T
+        nodes[:, :, 1] += (np.asarray(mean_size)[block] * mean).T
         out[block, DEPTH] = depth
     return out
 
