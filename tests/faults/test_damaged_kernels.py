@@ -38,8 +38,8 @@ def flies_the_same_after(flown, name, flips):
 
 
 def test_a_flipped_bit_in_a_compiled_kernel_or_in_its_source_changes_no_number(flown):
-    (kernel,) = [path for path in flown[2] if path.suffix == ".kernel"]
     (source,) = [path for path in flown[2] if path.suffix == ".py"]
+    (kernel,) = [path for path in flown[2] if path.suffix == ".kernel" and path.parent == source.parent]
     flies_the_same_after(flown, "few", [(kernel, len(flown[2][kernel]) // 2, 3), (source, 700, 7)])
 
 

@@ -18,8 +18,10 @@ from mc_engine.flight.card_code import CAPABILITIES, PER_CASE, TRIPLE, choices_o
 from mc_engine.lanes.kernel_cache import form_of
 
 CASES = 8
-LARGE = ("deorbit", "reentry", "geo_servicing")
-CAMPAIGNS = [name if name in MODELS else pytest.param(name, marks=pytest.mark.slow) for name in NAMES]
+LARGE = ("reentry", "geo_servicing")  # whose code takes longest to compile; they are slow tests as variants are
+CAMPAIGNS = [
+    name if name in MODELS and name not in LARGE else pytest.param(name, marks=pytest.mark.slow) for name in NAMES
+]
 _LANES = re.compile(r"call (?:<(\d+) x )?double>? @llvm\.fma\.")
 _EXTREMES = re.compile(r"^\s*(?:min|max)\.f64\s+(%\w+),", re.MULTILINE)
 
@@ -58,11 +60,11 @@ def test_cards_round_where_the_processor_rounds(name, capability):
 
 
 def assemblies():
-    """Every campaign for every card; the code of large kernels, which differs in one line, as a rule for one alone."""
+    """Every campaign for every card; the code for others, which differs in one line, in the tests marked slow."""
     for campaign in CAMPAIGNS:
         for capability in CAPABILITIES:
             name, marks = getattr(campaign, "values", (campaign,))[0], [*getattr(campaign, "marks", ())]
-            if name in LARGE and capability != CAPABILITIES[-1]:
+            if name != "minimal" and capability != CAPABILITIES[-1]:
                 marks.append(pytest.mark.slow)
             yield pytest.param(name, capability, marks=marks)
 
