@@ -121,7 +121,7 @@ def measure_card(campaign: Campaign, n_cases: int | None = None, repeats: int = 
     def seconds(flyer: Flyer, cases: int, repeats: int) -> float:
         ids = np.arange(cases, dtype=np.int64)
         table = case_table(campaign, ids)
-        return _shortest(lambda: fly_in_threads(campaign, table, ids, ["status"], workers, flyer), repeats)
+        return shortest(lambda: fly_in_threads(campaign, table, ids, ["status"], workers, flyer), repeats)
 
     on_processor, on_card = flyer_of(campaign), CardFlyer(campaign)
     cases = most if n_cases else min(_FIRST_TRIAL, most)
@@ -143,7 +143,7 @@ def _is_faster_on_a_card(campaign: Campaign) -> bool:
         return False  # no card, no measurement or one that was damaged
 
 
-def _shortest(flight: Callable[[], object], repeats: int) -> float:
+def shortest(flight: Callable[[], object], repeats: int) -> float:
     """Time of the fastest flight [s], after one that compiles."""
     flight()
     times = []

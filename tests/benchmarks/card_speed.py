@@ -31,6 +31,7 @@ from mc_engine.flight.kernel import usual_width
 from mc_engine.interruption import in_threads
 from mc_engine.model import AdaptiveStep
 from mc_engine.runner import runner
+from mc_engine.runner.backends import shortest
 from mc_engine.runner.cards import Card, CardFlyer, opened
 from mc_engine.studies.lane_speed import Flight, campaign_flight
 from tests.benchmarks.card_code import USUAL
@@ -40,19 +41,9 @@ from tests.mc_engine.flight.cards.shipped_kernels import NAMES, shipped
 
 PROBLEMS = (("orbit", "RK4", 10.0), ("ballistic", "DOP853", 1e-10), ("lifting", "DOP853", 1e-10))
 ON_CARD, FIRST_TRIAL = 131_072, 1024  # cases
+TURNS = 3
 LONG = 0.5  # s, of a flight on the processor
 DAY = Path(__file__).with_name("leo") / "day.toml"
-
-
-def shortest(flight_of_all: Callable[[], object], repeats: int = 3) -> float:
-    """Time of the fastest flight [s], after one that compiles."""
-    flight_of_all()
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        flight_of_all()
-        times.append(time.perf_counter() - begin)
-    return min(times)
 
 
 def in_processes(function: Callable[[Any], object], items: Iterable[Any]) -> None:
@@ -84,7 +75,7 @@ def on_two_threads(cases: Flight) -> float:
     for half in (ids[: ids.size // 2], ids[ids.size // 2 :]):
         inputs = {name: given[half] if np.ndim(given) else given for name, given in cases.inputs.items()}
         halves.append(flight.bound_flight(cases.model, inputs, half, cases.seed, folder=cases.folder, width=width)[0])
-    return shortest(lambda: in_threads(lambda fly: fly(), halves, 2)) / cases.n_cases
+    return shortest(lambda: in_threads(lambda fly: fly(), halves, 2), TURNS) / cases.n_cases
 
 
 def on_card(cases: Flight, card: Card) -> float:
@@ -92,7 +83,7 @@ def on_card(cases: Flight, card: Card) -> float:
     ids = np.arange(cases.n_cases)
     call = flight.bound_flight(cases.model, cases.inputs, ids, cases.seed, folder=cases.folder, width=1)[0]
     code = thread_code(call.func, call.args)
-    return shortest(lambda: card.fly(code, call.args)) / cases.n_cases
+    return shortest(lambda: card.fly(code, call.args), TURNS) / cases.n_cases
 
 
 def part_of(cases: Flight, n_cases: int) -> Flight:

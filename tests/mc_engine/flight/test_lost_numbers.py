@@ -158,7 +158,7 @@ LOST = {
 GUIDANCE = "from mc_engine.lanes import log, physics\n\n\n@physics\ndef lag(t):\n    return 0.1 * log(1.0 - t)\n"
 
 
-# adaptive, too, where the step looks at what is lost: at events, and at what the control and an event leave behind
+# with adaptive steps those that a step checks by itself: at events, and in what the control and an event give
 STEPPED = ("in the control, and used later", "in the function of an event", "in what an event does")
 
 

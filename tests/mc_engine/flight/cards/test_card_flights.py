@@ -158,7 +158,7 @@ def test_auto_takes_a_card_that_was_measured_to_be_faster(speeds, tmp_path, monk
     monkeypatch.setattr(backends, "cache_folder", lambda: tmp_path)
     fake = install(monkeypatch, FakeDriver())
     seconds = iter([CASES / speed for speed in speeds])
-    monkeypatch.setattr(backends, "_shortest", lambda flight, repeats: flight() and next(seconds))
+    monkeypatch.setattr(backends, "shortest", lambda flight, repeats: flight() and next(seconds))
     result = CliRunner().invoke(app, ["bench", "minimal", "--card", "--cases", str(CASES)])
     assert result.output == f"minimal: all cores {speeds[0]:,.0f} cases/s, a card {speeds[1]:,.0f} cases/s\n"
     fake.launches[0].clear()
