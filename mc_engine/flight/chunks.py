@@ -25,13 +25,13 @@ from mc_engine.store.case_rows import Row, RowLog
 from mc_engine.store.parts import CASE_COLUMNS, Column, Part, Written, read_part, revised_name, write_aside
 from mc_engine.store.run_files import NOMINAL_CASE
 
-SMALLEST_CHUNK, LARGEST_CHUNK = 64, 32_768
+SMALLEST_CHUNK, LARGEST_CHUNK = 64, Flyer.largest_chunk
 Guard = Callable[[np.ndarray], AbstractContextManager[None]]
 
 
-def chunk_size(cases: int, workers: int, chunks_per_worker: int = Flyer.chunks_per_worker) -> int:
+def chunk_size(cases: int, workers: int, flyer: Flyer | type[Flyer] = Flyer) -> int:
     """How many cases a worker flies at a time, and a part holds, by default."""
-    return min(max(-(-cases // (chunks_per_worker * workers)), SMALLEST_CHUNK), LARGEST_CHUNK)
+    return min(max(-(-cases // (flyer.chunks_per_worker * workers)), SMALLEST_CHUNK), flyer.largest_chunk)
 
 
 def chunks_of(ranges: Iterable[tuple[int, int]], size: int) -> Iterator[tuple[int, int]]:

@@ -70,12 +70,12 @@ def _columns(model: Model, refusals: Refusals, out: tuple[np.ndarray, ...]) -> d
     for numbers in out:
         numbers[np.isnan(numbers)] = np.nan  # processors and cards give it different signs
     time, status, states, metrics = out
-    reason = refusals.reason.astype(object)
-    columns = {"status": status_words(status), "reason": reason, END_TIME: time}
+    columns = {"status": status_words(status), "reason": refusals.reason, END_TIME: time}
     if model.phases:
         columns[END_PHASE] = last_phase = phase_words(model, metrics[-1])
-        failed = (status != OK) & (last_phase != "")
-        reason[failed] = [f'in the phase "{word}"' for word in last_phase[failed]]
+        if (failed := (status != OK) & (last_phase != "")).any():
+            columns["reason"] = refusals.reason.copy()
+            columns["reason"][failed] = [f'in the phase "{word}"' for word in last_phase[failed]]
     metrics = metrics[: len(model.metrics)]
     metrics[:, status != OK] = np.nan
     columns |= {f"end_{field.name}": row / field.si_factor for field, row in zip(model.states, states, strict=True)}

@@ -22,6 +22,7 @@ Sciences 52 (2004) 331-357: summed, in terms of the accelerations themselves ("o
 
 from collections import namedtuple
 from fractions import Fraction
+from functools import cache
 from math import comb
 from typing import Any
 
@@ -72,6 +73,7 @@ def _of_values(coefficients: list[Fraction]) -> list[Fraction]:
     ]
 
 
+@cache  # in rational numbers they take milliseconds, and every chunk of cases asks for them
 def gauss_jackson_tables(method: str) -> tuple[Any, ...]:
     """The numbers of a method such as "gj8", as kernels take them: those of DOP853, then those of the sums.
 

@@ -17,6 +17,7 @@ compensated sum of the steps: O. Moller, BIT 5 (1965) 37-50.
 
 from collections import namedtuple
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -61,6 +62,7 @@ def adams_weights(order: int, implicit: bool) -> list[Fraction]:
     return weights
 
 
+@cache  # in rational numbers they take milliseconds, and every chunk of cases asks for them
 def multistep_tables(method: str) -> tuple[Any, ...]:
     """The numbers of a method such as "abm11", as kernels take them: those of DOP853, then those of the sums.
 

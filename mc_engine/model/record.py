@@ -131,11 +131,14 @@ class Model:
         return inputs_of(self)[name]
 
 
+_CAN_START = np.array("", dtype=object)
+
+
 @dataclass
 class Refusals:
     """The cases that a model cannot start from, each with one sentence: the third argument of `prepare`.
 
-    reason : object[n_cases] of str, empty for a case that can start
+    reason : object[n_cases] of str, not to be written to; empty for a case that can start
 
     >>> refusals = Refusals.none(3)
     >>> refusals.add(np.array([False, True, False]), "the perigee is below the surface")
@@ -148,18 +151,20 @@ class Refusals:
     @classmethod
     def none(cls, n_cases: int) -> "Refusals":
         """No case refused, of n_cases."""
-        return cls(np.full(n_cases, "", dtype=object))
+        return cls(np.broadcast_to(_CAN_START, n_cases))
 
     def add(self, mask: np.ndarray, sentence: str) -> None:
         """Refuse the cases in `mask` (bool[n_cases]) unless they were refused before."""
         refused = mask & np.ones(self.reason.shape, dtype=bool)  # also refuses a mask that is none
-        if refused.any():  # seldom; comparing the words of all cases takes longest
-            self.reason[refused & (self.reason == "")] = sentence
+        if refused.any():
+            self.reason = np.where(refused & ~self.mask, sentence, self.reason)
 
     @property
     def mask(self) -> np.ndarray:
         """bool[n_cases], true where the case is refused."""
-        return self.reason != ""
+        # as a rule one word seen n times: to compare the words of all cases would hold back all other threads
+        apart = self.reason[:1] if self.reason.strides == (0,) else self.reason
+        return np.broadcast_to(apart != "", self.reason.shape)
 
 
 def load_model(reference: str, beside: Path | None = None) -> Model:

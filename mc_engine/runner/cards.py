@@ -218,10 +218,11 @@ def _card_kernel(model: Model, folder: Path | None, width: int) -> Callable[...,
 class CardFlyer(CompiledFlyer):
     """A compiled model, one case a thread.  Time histories fly on the processor.
 
-    A card flies thousands of cases in the time of one, so the chunks are as large as they may be.
+    A card flies thousands of cases in the time of one, so the chunks are as large as they may be.  In larger ones
+    there is less to do for each case in the interpreter, for which the worker threads wait in turn.
     """
 
-    chunks_per_worker = 1
+    chunks_per_worker, largest_chunk = 1, 131_072
     _width = 1
     _build = staticmethod(_card_kernel)
 

@@ -16,6 +16,7 @@ from mc_engine.campaign.sensitivity_design import companion, sensitivity_record
 from mc_engine.durable_file import remove_file
 from mc_engine.errors import DiskError, RunInterrupted, StoreError, WorkersLost
 from mc_engine.flight.chunks import NOMINAL_TASK, Task, chunk_size, rerun_tasks
+from mc_engine.flight.flyer import Flyer
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import in_threads, stop_signal
 from mc_engine.runner.backends import Backend, flyer_on
@@ -67,7 +68,7 @@ def complete(store: Store, campaign: Campaign, session: Session, repair: bool = 
 def _fly_missing(store: Store, campaign: Campaign, session: Session, repair: bool, stop: threading.Event) -> None:
     if repair:
         withdraw_damaged(store)
-    tasks, size = _missing_tasks(store, session, flyer_on(session.backend.name, campaign).chunks_per_worker)
+    tasks, size = _missing_tasks(store, session, flyer_on(session.backend.name, campaign))
     missing = sum(task.stop - task.first for task in tasks)
     store.note("started", backend=session.backend.name, workers=session.workers, chunk=size, missing=missing)
     begin = time.perf_counter()
@@ -232,13 +233,13 @@ def _has_sound_nominal(store: Store) -> bool:
     return part is not None and not problem_of(store.path / part.file, store.nominal)
 
 
-def _missing_tasks(store: Store, session: Session, chunks_per_worker: int) -> tuple[list[Task], int]:
+def _missing_tasks(store: Store, session: Session, flyer: Flyer) -> tuple[list[Task], int]:
     """Tasks for the missing cases, and the number of cases of a part."""
     missing = store.missing()
     end = store.wanted.stop
     along = stretches(store.notes(), min(end, store.manifest["campaign"]["cases"]), end)
     cases = sum(stop - first for first, stop in missing)
-    size = session.chunk or along[-1].chunk or chunk_size(cases, session.workers, chunks_per_worker)
+    size = session.chunk or along[-1].chunk or chunk_size(cases, session.workers, flyer)
     if session.chunk is not None:
         along = [Stretch(end, session.chunk)]
     return [Task(*bounds) for bounds in part_bounds(missing, store.notes(), along, size)], size

@@ -39,7 +39,13 @@ from tests.benchmarks.peer_codes.engine import load
 from tests.benchmarks.peer_codes.problems import BY_KEY
 from tests.mc_engine.flight.cards.shipped_kernels import NAMES, shipped
 
-PROBLEMS = (("orbit", "RK4", 10.0), ("ballistic", "DOP853", 1e-10), ("lifting", "DOP853", 1e-10))
+PROBLEMS = (
+    ("orbit", "RK4", 10.0),
+    ("orbit", "DOP853", 5.62e-11),  # to a millimetre, as the next
+    ("orbit", "GJ9", 75.0),
+    ("ballistic", "DOP853", 1e-10),
+    ("lifting", "DOP853", 1e-10),
+)
 ON_CARD, FIRST_TRIAL = 131_072, 1024  # cases
 TURNS = 3
 LONG = 0.5  # s, of a flight on the processor

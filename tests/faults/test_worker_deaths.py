@@ -30,7 +30,7 @@ import broken_builds
 from mc_engine.runner import sessions
 
 chunk, broken = int(sys.argv[1]), sys.argv[2]
-sessions.chunk_size = lambda cases, workers, chunks_per_worker: chunk
+sessions.chunk_size = lambda cases, workers, flyer: chunk
 if broken:
     broken_builds.BREAKS[broken](setattr)
 sys.argv[:3] = ["mc-engine"]

@@ -198,10 +198,11 @@ def stored_references(
             'reference path of its own; disperse the errors and factors instead, or set plan = "given" with plan_...'
         )
     for k, numbers in enumerate(distinct.T):
-        mine = np.flatnonzero(asked)[which.ravel() == k]
+        mine = np.zeros(asked.size, dtype=bool)
+        mine[asked] = which.ravel() == k
         reference = reference_table_of(Plan(*(float(number) for number in numbers)))
         if isinstance(reference, str):
-            refusals.reason[mine] = reference
+            refusals.add(mine, reference)
         else:
             start[mine] = first + sum(table.size for table in tables)
             along[mine] = stored.Header(*reference[: len(stored.Header._fields)]).range

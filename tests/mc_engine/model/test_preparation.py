@@ -45,6 +45,7 @@ def test_a_mistake_in_the_preparation_of_cases_is_a_sentence_with_its_fix(tmp_pa
         ('refusals.add(None, "why")', USE),
         ('refusals.add(np.maximum(inputs.altitude - 1e9, 0.0), "why")', USE),
         ('refusals.add(np.zeros(7, dtype=bool), "why")', USE),
+        ('refusals.reason[0] = "why"', f"assignment destination is read-only; {USE}"),
         ("r = 1.0 if inputs.altitude > 0.0 else 2.0", USE),
         ("import math; r = math.sqrt(inputs.altitude)", USE),
         ('more["altitude"] = inputs.altitude + 0j', '`prepare` gives "altitude" as complex numbers; it must be a num'),
