@@ -186,7 +186,8 @@ def _assemble(
     _unknown_names(document, sections, nominal, model, findings)
     check_taken(sections, upstream, design, findings)
     dispersions = _dispersions(sections, model, nominal, design, directory, findings)
-    correlations = check_correlations(sections.correlations, dispersions, model, design or "mc", findings)
+    faulty = _faulty_dispersions(document, dispersions)
+    correlations = check_correlations(sections.correlations, dispersions, faulty, model, design or "mc", findings)
     table_path: Path | None = None
     table: dict[str, np.ndarray] = {}
     if upstream is None:
@@ -203,8 +204,9 @@ def _assemble(
     names = [dispersion.name for dispersion in dispersions]
     tuning = check_tuning(sections.tuning, model, names, design, findings.under("tuning"))
     flown_before = None if upstream is None else upstream.name
+    under_sensitivity = findings.under("sensitivity")
     sensitivity = check_sensitivity(
-        sections.sensitivity, model, dispersions, correlations, design, flown_before, findings.under("sensitivity")
+        sections.sensitivity, model, dispersions, faulty, correlations, design, flown_before, under_sensitivity
     )
     if section is None or count is None or findings.problems:
         return None
@@ -301,6 +303,13 @@ def _dispersions(
                 build_dispersion(name, section, model.input(name), nominal[name], design, directory, section_findings)
             )
     return tuple(built)
+
+
+def _faulty_dispersions(document: dict[str, Any], built: tuple[Dispersion, ...]) -> frozenset[str]:
+    """The names of dispersions that are in the file and have mistakes of their own, or no known design."""
+    written = document.get("dispersion")
+    names = written if isinstance(written, dict) else ()
+    return frozenset(names) - {dispersion.name for dispersion in built}
 
 
 def _case_count(

@@ -149,11 +149,12 @@ def refusal(model: System, values: Mapping[str, Scalar]) -> str:
 def check_correlations(
     sections: Mapping[str, CorrelationSection],
     dispersions: tuple[Dispersion, ...],
+    faulty: frozenset[str],
     model: System,
     design: str,
     findings: Findings,
 ) -> tuple[Correlation, ...]:
-    """The correlations; `sections` by place in the file."""
+    """The correlations; `sections` by place in the file, `faulty` the dispersions with mistakes of their own."""
     if sections and design not in RANDOM:
         why = "is for independent inputs" if design in IN_BLOCKS else "has no chance in it"
         findings.add("correlation", f'the design "{design}" {why}; correlations are for {listed(RANDOM)}')
@@ -165,12 +166,13 @@ def check_correlations(
         section_findings = findings.under(place)
         before = len(findings.problems)
         for name in section.between:
-            _check_correlated(name, by_name, model, section_findings)
+            if name not in faulty:
+                _check_correlated(name, by_name, model, section_findings)
         if first == second:
             section_findings.add("between", f'"{first}" is there twice')
         elif any({first, second} == {other.first, other.second} for other in kept):
             section_findings.add("between", f'"{first}" and "{second}" have a correlation already')
-        if len(findings.problems) == before:
+        if len(findings.problems) == before and not faulty.intersection(section.between):
             kept.append(Correlation(first, second, section.rank, section.source))
     matrix = group_matrix(list(by_name), rank_pairs(kept))[1]
     if kept and not is_positive_definite(matrix):

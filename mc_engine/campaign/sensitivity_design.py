@@ -60,23 +60,28 @@ def check_sensitivity(
     section: SensitivitySection | None,
     model: System,
     dispersions: Sequence[Dispersion],
+    faulty: frozenset[str],
     correlations: Sequence[Correlation],
     design: str | None,
     upstream: str | None,
     findings: Findings,
 ) -> SensitivityDesign | None:
-    """The design that [sensitivity] asks for, None without one.  upstream : name of the campaign flown before."""
+    """The design that [sensitivity] asks for, None without one.
+
+    faulty : dispersions with mistakes of their own.  upstream : name of the campaign flown before.
+    """
     if section is None:
         return None
     if design in (*BY_LEVELS, *IN_BLOCKS) or (design == "table" and upstream is None):
-        findings.add("", f'the design "{design}" draws nothing from distributions; [sensitivity] is for mc, lhs, sobol')
+        why = "has cases for the contributions itself" if design in IN_BLOCKS else "draws nothing from distributions"
+        findings.add("", f'the design "{design}" {why}; [sensitivity] is for mc, lhs, sobol')
         return None
     problems = len(findings.problems)
-    groups = dict(_groups(section, model, dispersions, correlations, findings.under("group")))
+    groups = dict(_groups(section, model, dispersions, faulty, correlations, findings.under("group")))
     if upstream is not None:
         groups = {_CASES_OF + upstream: (), **groups}
     chosen = SensitivityDesign(section.cases, groups)
-    if not groups:
+    if not groups and not faulty:
         findings.add("", "there is no dispersion whose contribution could be computed")
     elif chosen.flights > MOST_CASES:
         findings.add(
@@ -89,6 +94,7 @@ def _groups(
     section: SensitivitySection,
     model: System,
     dispersions: Sequence[Dispersion],
+    faulty: frozenset[str],
     correlations: Sequence[Correlation],
     findings: Findings,
 ) -> Iterator[tuple[str, tuple[str, ...]]]:
@@ -99,6 +105,8 @@ def _groups(
     for group, members in section.group.items():
         _check_group(group, members, names, findings)
         for name in members:
+            if name in faulty:
+                continue
             if name not in names:
                 findings.add(group, f'"{name}" is not dispersed{hint(name, names)}')
             elif name in draws:

@@ -1,8 +1,8 @@
 """The application of the command line, and what its commands share: exit statuses, arguments, checks of paths.
 
 Exit status: 0 done, 1 a requirement is not met (`run --judge`), 2 wrong usage or campaign, 3 more failed cases than
-allowed (`run --max-failed`), 4 interrupted or disk full, and resumable, 5 directory damaged or busy, 6 unexpected error
-or too little memory, with a log file.
+allowed (`run --max-failed`), 4 interrupted or disk full, and resumable, 5 directory damaged or busy, or object store
+out of reach, 6 unexpected error or too little memory, with a log file.
 """
 
 import errno
@@ -58,7 +58,8 @@ app = typer.Typer(
     cls=_Commands,
     help="Monte Carlo dispersion campaigns for spacecraft guidance, navigation and control.",
     epilog="Exit status: 0 done, 1 a requirement not met, 2 wrong usage or campaign, 3 too many failed cases, "
-    "4 interrupted or disk full, 5 damaged or busy directory, 6 unforeseen error or too little memory.",
+    "4 interrupted or disk full, 5 damaged or busy directory, or object store out of reach, 6 unforeseen error or too "
+    "little memory.",
     no_args_is_help=True,
     rich_markup_mode=None,  # plain help: importing rich takes longer than all the rest
     pretty_exceptions_enable=False,
@@ -225,8 +226,11 @@ def _refuse_unreadable(path: Path) -> None:
         leave(USAGE, f"{path}: is a folder that this user may not read")
 
 
-def refuse_occupied_folder(path: Path) -> None:
-    """End the command if --out is occupied or cannot be written to; called before anything is compiled."""
+def refuse_occupied_folder(path: Path, option: str = "--out ") -> None:
+    """End the command if the new folder is occupied or cannot be written to; called before anything is compiled.
+
+    option : what the sentence begins with; empty where the folder is an argument
+    """
     from mc_engine.store.opening import open_store
     from mc_engine.store.run_files import JOURNAL, RUN, is_run_directory, kind_of
     from mc_engine.store.store import refuse_occupied
@@ -234,19 +238,19 @@ def refuse_occupied_folder(path: Path) -> None:
 
     if (path / JOURNAL).exists() and is_run_directory(path) and open_store(path).missing():
         resume = f"`mc-engine resume {shell_word(path)}`"
-        leave(USAGE, f"--out {path}: holds a run that is not complete; {resume} flies the rest")
+        leave(USAGE, f"{option}{path}: holds a run that is not complete; {resume} flies the rest")
     # With a lock file and no journal, a creation was interrupted; `create_store` knows which files it may have left.
     complete = (path / JOURNAL).exists() or kind_of(path) not in (None, RUN)
     if complete or not (path / LOCK_NAME).exists():
         try:
             refuse_occupied(path)
         except StoreError as error:
-            leave(USAGE, f"--out {error}")
+            leave(USAGE, f"{option}{error}")
     if run := next((parent for parent in path.absolute().parents if os.path.isfile(parent / JOURNAL)), None):
-        leave(USAGE, f"--out {path}: lies inside the {kind_of(run)} {run.name}; choose another folder")
+        leave(USAGE, f"{option}{path}: lies inside the {kind_of(run)} {run.name}; choose another folder")
     existing = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
     if not (existing.is_dir() and os.access(existing, os.W_OK)):
-        leave(USAGE, f"--out {path}: {existing} is no folder that can be written to")
+        leave(USAGE, f"{option}{path}: {existing} is no folder that can be written to")
 
 
 def refuse_unwritable_file(option: str, path: Path) -> None:

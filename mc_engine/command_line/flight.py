@@ -382,7 +382,7 @@ def merge(
     """Make one run of the shards of a campaign: the same table as flown by one process."""
     for shard in shards:
         existing_run(shard)
-    refuse_occupied_folder(out)
+    refuse_occupied_folder(out, option="")
     advise(lambda: after_flight(out))
     store = _with_progress(
         lambda runner, progress: runner.merge(out, shards, progress=progress, workers=workers, chunk=chunk),

@@ -92,6 +92,18 @@ def test_a_part_of_the_file_that_does_not_fit_the_model_is_refused_with_its_plac
         assert problems(body) == {place: message}
 
 
+GROUPED = '[sensitivity]\ncases = 64\ngroup = { both = ["speed_pct", "height_km"] }\n'
+
+
+@pytest.mark.parametrize("places", [["dispersion.speed_pct.sigma"], ["campaign.design"]], ids=["dispersion", "design"])
+def test_a_dispersion_with_a_mistake_is_not_said_to_be_missing_where_it_is_named(places):
+    body = TWO.replace("sigma = 1", "sigma = -1") if places[0].startswith("dispersion") else TWO
+    design = "mc" if body != TWO else "mcc"
+    assert list(problems(body + CORRELATION + GROUPED, design)) == places
+    rest = CORRELATION.replace("height_km", "heigth_km") + GROUPED
+    assert list(problems(body + rest, design)) == [*places, "correlation 1.between"]
+
+
 @pytest.mark.parametrize("design", ["grid", "one_at_a_time"])
 def test_a_design_without_chance_has_no_correlations(design):
     axes = "[dispersion.speed_pct]\nvalues = [1]\n[dispersion.height_km]\nvalues = [1]\n"

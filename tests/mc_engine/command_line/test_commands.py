@@ -199,6 +199,9 @@ def test_an_occupied_folder_is_refused_before_flying(here, calls):
     fails_with(2, call("run", "cart", "--out", "flown"), "--out flown: holds a run already")
     fails_with(2, call("run", "cart", "--out", "cart"), "--out cart: is not empty and holds no run")
     fails_with(2, call("run", "cart", "--out", "flown/cases/in"), "--out flown/cases/in: lies inside the run flown")
+    merged = call("merge", "flown", "flown")  # the folder is an argument there, and no option
+    fails_with(2, merged, "flown: holds a run already")
+    assert "--out" not in merged.stderr
     (here / "flown" / "in").mkdir()
     (here / "flown" / "in" / ".lock").touch()  # as a creation that was cut short leaves it
     fails_with(2, call("run", "cart", "--out", "flown/in"), "--out flown/in: lies inside the run flown")
