@@ -27,6 +27,11 @@ def is_real(text: str) -> bool:
     return _REAL.fullmatch(text) is not None
 
 
+def is_number(text: str) -> bool:
+    """True for the text of a number as programs write it, which may be infinite or not a number."""
+    return is_real(text) or text.lower().removeprefix("+").removeprefix("-") in ("nan", "inf", "infinity")
+
+
 def percent_digits(share: float) -> str:
     """A share that somebody gave, in percent with all its digits: 99.996833 for 0.99996833."""
     return f"{(Decimal(f'{share:.{_GIVEN_DIGITS}g}') * 100).normalize():f}"

@@ -136,6 +136,7 @@ class Worker:
         elif self._simulator.start is not None:
             self._shared = self._simulator.start()
         self._before = own_children()  # which `start` may have begun, and which live on
+        self._folder = os.open(".", os.O_RDONLY)  # in which every case begins, wherever the one before it went
 
     def fly(self, order: Order, reply: Callable[[Any], None]) -> None:
         """Fly the cases of an order in turn; one reply for each, or one for a batch."""
@@ -162,43 +163,36 @@ class Worker:
         if self._program is not None:
             result = self._program.fly(inputs, case, order.history)
         else:
-            result = self._called(inputs, case, order.history)
-            end_children(self._before)
-        sys.stdout.flush()
-        sys.stderr.flush()
+            result = self._called(_read, dict(inputs), case, order.history)  # a copy, which the function may change
+        for stream_ in (sys.stdout, sys.stderr):
+            with suppress(ValueError):  # of one that the function closed
+                stream_.flush()
         keep = None if order.keep is None else Path(order.keep)
         settle(self._simulator.keep, self._work, name, result.status, keep, inputs)
         _empty_streams()
         return result
 
-    def _called(self, inputs: dict[str, Any], case: Any, history: bool) -> Flown:
-        """What the function gives for one case."""
+    def _batch(self, order: Order) -> Any:
+        """(metrics by name, Flown of all with the history): arrays [n]; of an error, Flown with its status alone."""
+        inputs = {name: np.asarray(values) for name, values in order.inputs.items()}
+        cases = BatchCase(order.noise, self._seed, self._work, self._shared)
+        try:
+            return self._called(_read_batch, inputs, cases, order)
+        finally:
+            shutil.rmtree(self._work / folder_name(int(order.noise[0])), ignore_errors=True)
+
+    def _called(self, read: Callable[..., Any], inputs: Mapping[str, Any], case: Any, how: Any) -> Any:
+        """What `read` finds in what the function returns, or Flown with the status of what is wrong with it."""
         assert self._fly is not None  # no program
         try:
             given = self._fly(inputs, case)
         except BaseException as error:
             return _failed(error, self._simulator.reference)
-        return self._result(_read, given, history)
-
-    def _batch(self, order: Order) -> Any:
-        """(metrics by name, Flown of all with the history): arrays [n]; of an error, Flown with its status alone."""
-        assert self._fly is not None  # no program
-        inputs = {name: np.asarray(values) for name, values in order.inputs.items()}
-        folder = self._work / folder_name(int(order.noise[0]))
-        try:
-            given = self._fly(inputs, BatchCase(order.noise, self._seed, self._work, self._shared))
-        except BaseException as error:
-            return _failed(error, self._simulator.reference)
         finally:
             end_children(self._before)
-            if folder.exists():
-                shutil.rmtree(folder, ignore_errors=True)
-        return self._result(_read_batch, given, order)
-
-    def _result(self, read: Callable[..., Any], given: Any, *how: Any) -> Any:
-        """What `read` finds in what the function returned, or Flown with the status of what is wrong with it."""
+            os.fchdir(self._folder)
         try:
-            return read(self._simulator, given, *how)
+            return read(self._simulator, given, how)
         except ValueError as fault:
             return flown(NO_RESULT, str(fault))
         except BaseException as error:  # of the user's own mapping

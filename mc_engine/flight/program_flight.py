@@ -22,6 +22,7 @@ import numpy as np
 
 from mc_engine.model.program import JSON_INPUT, template_environment
 from mc_engine.model.simulator import Simulator
+from mc_engine.numbers_in_text import is_number
 from mc_engine.process_tree import end_children, how_it_ended, kill_group, memory_mib
 from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, NOT_FINITE, OK, STATUS_NAME, TIME_LIMIT
 from mc_engine.text import clean
@@ -289,31 +290,40 @@ def _content(folder: Path, name: str) -> bytes:
     return path.read_bytes()
 
 
+def _text(folder: Path, name: str) -> str:
+    """The text of a file that a program wrote, with or without a byte order mark."""
+    try:
+        return _content(folder, name).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{name} is not text in UTF-8: {error}") from None
+
+
 def _document(folder: Path, name: str) -> Any:
     """The result as nested mappings and lists; of a CSV, its one row by column."""
-    content = _content(folder, name)
-    try:
-        text = content.decode()
-        if name.endswith(".json"):
+    text = _text(folder, name)
+    if name.endswith(".json"):
+        try:
             return json.loads(text)
-    except ValueError as error:
-        raise ValueError(f"{name} cannot be read: {error}") from None
-    rows = [row for row in csv.reader(io.StringIO(text)) if row]
+        except (ValueError, RecursionError) as error:
+            raise ValueError(f"{name} cannot be read: {error}") from None
+    rows = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
     if len(rows) != 2 or len(rows[0]) != len(rows[1]):
-        raise ValueError(f"{name} has {len(rows)} rows; it must have one of names and one of numbers, of equal length")
+        fields = " and ".join(str(len(row)) for row in rows[:2]) or "no"
+        found = f"{len(rows)} rows, the first of {fields} fields"
+        raise ValueError(f"{name} has {found}; it must have one of names and one of numbers, of equal length")
     return {key.strip(): value for key, value in zip(*rows, strict=True)}
 
 
 def _table(folder: Path, name: str) -> tuple[list[str], np.ndarray]:
     """(names of the columns, float64[rows, columns]) of a CSV."""
-    first, _, rest = _content(folder, name).decode().partition("\n")
+    first, _, rest = _text(folder, name).partition("\n")
     names = [column.strip() for column in next(csv.reader([first]), [])]
     if not rest.strip():
         return names, np.empty((0, len(names)))
     try:
         table = np.loadtxt(io.StringIO(rest), delimiter=",", ndmin=2)
     except ValueError as error:
-        raise ValueError(f"{name} cannot be read: {error}") from None
+        raise ValueError(f"{name} cannot be read: {str(error).partition(';')[0]}") from None  # then what NumPy could do
     if table.shape[1] != len(names):
         raise ValueError(f"{name} has {table.shape[1]} columns, and names of {len(names)}")
     return names, table
@@ -347,12 +357,12 @@ def _number(name: str, document: Any, path: str | None, pattern: str | None, std
             if sometimes:
                 return float("nan")
             raise ValueError(f'the result has no "{path}", by which "{name}" is read') from None
-    try:
-        if isinstance(value, bool):
-            raise TypeError
-        return float(value)
-    except (TypeError, ValueError):
-        raise ValueError(f'"{name}" is {clean(str(value)[:60])}, which is no number') from None
+    text = value.strip() if isinstance(value, str) else json.dumps(value)
+    if sometimes and text in ("", "null"):
+        return float("nan")
+    if isinstance(value, bool) or not is_number(text):
+        raise ValueError(f'"{name}" is {clean(text)[:60] or "empty"}, which is no number')
+    return float(text)
 
 
 def _input_difference(document: Any, path: str, inputs: Mapping[str, Any]) -> str:

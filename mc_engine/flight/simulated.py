@@ -291,6 +291,6 @@ class _Flight:
 
     def _order(self, places: list[int]) -> Order:
         columns = {name: column[places] for name, column in self._columns.items()}
-        keep = None if self._keep is None else str(self._keep)
+        keep = None if self._keep is None else str(self._keep.absolute())  # cases may change their folder
         log = None if self._log is None else self._log.at(places)
         return Order(columns, self._noise[places], self._on_history is not None, keep, log)

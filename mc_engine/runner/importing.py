@@ -19,7 +19,7 @@ from mc_engine.errors import CampaignError, Problem
 from mc_engine.flight.chunks import LARGEST_CHUNK, chunks_of
 from mc_engine.flight.flyer import Columns
 from mc_engine.model.files import FileFault
-from mc_engine.numbers_in_text import is_real
+from mc_engine.numbers_in_text import is_number
 from mc_engine.runner.flown_campaign import companions_of
 from mc_engine.runner.manifest import columns_of, manifest_of
 from mc_engine.sampling.distributions import column as typed_column
@@ -131,12 +131,8 @@ def _numbers_or_nan(file: Path, name: str, cells: np.ndarray) -> np.ndarray:
     try:
         return np.asarray(pa.array(texts, pa.string(), mask=empty).cast(pa.float64()).to_numpy(zero_copy_only=False))
     except pa.ArrowInvalid:
-        row = next(row for row, text in enumerate(texts) if not (empty[row] or _is_number(text)))
+        row = next(row for row, text in enumerate(texts) if not (empty[row] or is_number(text)))
     raise FileFault(f'"{file.name}", row {row + 1}, column "{name}": {str(cells[row])!r:.60} is not a number')
-
-
-def _is_number(text: str) -> bool:
-    return is_real(text) or text.lower().lstrip("+-") in ("nan", "inf", "infinity")
 
 
 def _refuse_unknown_words(table: Columns, problems: list[Problem]) -> None:

@@ -52,7 +52,7 @@ class RowLog:
 
     def of(self, case_ids: np.ndarray) -> "RowLog":
         """The same log, for cases that are named by their place in `case_ids`; it can be sent to another process."""
-        return RowLog(self._run, self._first, self._stop, case_ids)
+        return RowLog(self._run.absolute(), self._first, self._stop, case_ids)
 
     def at(self, places: Sequence[int]) -> "RowLog":
         """The same log for some of these cases."""

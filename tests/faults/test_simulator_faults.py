@@ -1,5 +1,6 @@
 """Cases of simulators that crash, hang, leak or give nothing: each costs itself, and nothing is left running."""
 
+import json
 import os
 import signal
 import subprocess
@@ -186,6 +187,55 @@ def test_the_echo_finds_an_input_that_is_rounded(tmp_path):
     table = run(load_campaign(file), tmp_path / "run", workers=1).cases()
     assert set(table["status"]) == {"no-result"}
     assert table["reason"].str.contains("the program used mass_kg = ").all()
+
+
+def test_what_a_function_does_to_its_process_ends_with_its_case(tmp_path, monkeypatch, sound):
+    monkeypatch.chdir(tmp_path)  # the run is named from the folder that the cases leave
+    left = "import os, sys\nassert os.path.exists('here')\nif case.id % 2:\n    os.chdir(case.folder)"
+    fault = f"{left}\n    inputs['height_m'] = -1.0\n    sys.stdout.close()\n    raise ValueError('odd')"
+    Path("here").touch()
+    table = run(load_campaign(python_campaign(Path("ball"), cases=4, fault=fault)), Path("run"), workers=1).cases()
+    refuse_others(table, (1, 3), "crashed", "ValueError: odd")
+    assert table[::2].equals(sound[:4:2])
+    assert json.loads(Path("run/simulator/case-0000001/case.json").read_text())["height_m"] == table["height_m"][1]
+
+
+RESULTS = {
+    "mark": ('\ufeff{"time": 1.5}', "ok", ""),
+    "text": ('{"time": " -2.5E1 "}', "ok", ""),
+    "nothing": ('{"time": null}', "ok", ""),  # of a metric that may be missing
+    "large": ('{"time": 1%s}' % ("0" * 400), "not-finite", '"fall_time_s" is infinite'),
+    "groups": ('{"time": "1_000"}', "no-result", '"fall_time_s" is 1_000, which is no number'),
+    "digits": ('{"time": "\u0661"}', "no-result", '"fall_time_s" is \u0661, which is no number'),
+    "truth": ('{"time": true}', "no-result", '"fall_time_s" is true, which is no number'),
+    "deep": ("[" * 100_000, "no-result", "result.json cannot be read: maximum recursion depth"),
+    "bytes": ("\udcff", "no-result", "result.json is not text in UTF-8"),
+}
+
+
+def test_a_result_is_read_by_the_syntax_of_numbers_and_of_text(tmp_path):
+    for case, (text, _, _) in enumerate(RESULTS.values()):
+        (tmp_path / f"{case}.json").write_bytes(text.encode(errors="surrogateescape"))
+    (tmp_path / "-1.json").write_text('{"time": 1.0}')
+    (tmp_path / "campaign.toml").write_text(f"""
+[campaign]
+cases = {len(RESULTS)}
+design = "mc"
+seed = 3
+[simulator]
+command = ["cp", "{tmp_path}/{{case_id}}.json", "result.json"]
+result = "result.json"
+parameter.mass_kg = {{ default = 10.0 }}
+metric.fall_time_s = {{ read = "time", sometimes = true }}
+[dispersion.mass_kg]
+dist = "normal"
+sigma = 0.5
+""")
+    table = run(load_campaign(tmp_path / "campaign.toml"), tmp_path / "run", workers=1).cases()
+    assert table["fall_time_s"][:2].tolist() == [1.5, -25.0]
+    for row, (_, status, reason) in zip(table.to_dict("records"), RESULTS.values(), strict=True):
+        assert row["status"] == status, row
+        assert reason in row["reason"]
 
 
 HISTORIES = {
