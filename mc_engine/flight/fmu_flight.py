@@ -1,6 +1,7 @@
 """Flights of an FMU, through the package fmpy: one instance, which is reset between cases."""
 
 import io
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,11 @@ import numpy as np
 
 from mc_engine.errors import ModelError
 from mc_engine.model.fmu import CO_SIMULATION, Fmu
+from mc_engine.model.simulator import Refuse
+
+WHOLE = {"Boolean": (0, 1), "Integer": (-(2**31), 2**31 - 1), "Enumeration": (-(2**31), 2**31 - 1)}
+WHOLE |= {f"Int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)}
+WHOLE |= {f"UInt{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)}
 
 
 class FmuFlight:
@@ -25,6 +31,7 @@ class FmuFlight:
         try:
             fmpy.extract(io.BytesIO(fmu.content), home)
             self._description = fmpy.read_model_description(str(home))
+            self._types = {variable.name: variable.type for variable in self._description.modelVariables}
             self._instance = self._ready()
         except Exception as error:  # fmpy has errors of many kinds
             raise ModelError(f"the FMU cannot be started: {error}") from None
@@ -35,7 +42,8 @@ class FmuFlight:
 
         flown = self._fmu
         metrics = [variable for variable, _, _ in flown.metrics.values()]
-        instance, self._instance = self._ready(), None  # after an error it is begun anew
+        start = {variable: self._checked(name, inputs[name]) for name, variable in flown.parameters.items()}
+        instance = self._ready()  # after an error it is begun anew
         table = fmpy.simulate_fmu(
             str(self._home),
             start_time=0.0,
@@ -43,26 +51,40 @@ class FmuFlight:
             step_size=flown.step_s,
             output_interval=flown.step_s,
             relative_tolerance=flown.solver_tolerance,
-            start_values={variable: inputs[name] for name, variable in flown.parameters.items()},
+            start_values=start,
             output=[*metrics, *flown.outputs.values()],
             model_description=self._description,
             fmu_instance=instance,
         )
         self._instance = instance
         time = np.asarray(table["time"])
+        history = {variable: np.asarray(table[variable], dtype=np.float64) for variable in table.dtype.names}
         results = {
-            name: taken(time, np.asarray(table[variable], dtype=np.float64), what, level)
-            for name, (variable, what, level) in flown.metrics.items()
+            name: taken(time, history[variable], what, level) for name, (variable, what, level) in flown.metrics.items()
         }
-        return results, {"t_s": time, **{name: np.asarray(table[variable]) for name, variable in flown.outputs.items()}}
+        return results, {"t_s": time, **{name: history[variable] for name, variable in flown.outputs.items()}}
+
+    def _checked(self, name: str, value: float) -> float:
+        """The value of a parameter; Refuse for one that the type of its variable would change."""
+        variable = self._fmu.parameters[name]
+        kind = self._types[variable]
+        low, high = WHOLE.get(kind, (-math.inf, math.inf))
+        if kind in WHOLE and not (value == int(value) and low <= value <= high):
+            raise Refuse(f'{name} is {value:.15g}, and "{variable}" is a whole number from {low} to {high} ({kind})')
+        return value
 
     def _ready(self) -> Any:
-        """The instance, as if no case had been flown."""
+        """The instance, as if no case had been flown; a new one where the FMU cannot be reset."""
         from fmpy.simulation import instantiate_fmu
 
-        if self._instance is not None:
-            self._instance.reset()
-            return self._instance
+        instance, self._instance = self._instance, None
+        if instance is not None:
+            try:
+                instance.reset()
+            except Exception:  # fmpy has errors of many kinds
+                instance.freeInstance()
+            else:
+                return instance
         kind = "CoSimulation" if self._fmu.interface == CO_SIMULATION else "ModelExchange"
         return instantiate_fmu(str(self._home), self._description, kind)
 

@@ -9,6 +9,7 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
+from math import isclose
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +76,7 @@ def fmu_simulator(section: SimulatorSection, directory: Path, problems: Problems
         name: _bound(f"output.{name}", name, entry, variables, problems) for name, entry in section.output.items()
     }
     interface = _interface(section, description, problems)
-    stop, step = _times(section, description, problems)
+    stop, step = _times(section, description, interface, problems)
     tolerance = section.solver_tolerance or _experiment(description, "tolerance") or _SOLVER_TOLERANCE
     if problems:
         return None
@@ -144,17 +145,27 @@ def _interface(section: SimulatorSection, description: Any, problems: Problems) 
     return section.interface or next(iter(built), CO_SIMULATION)
 
 
-def _times(section: SimulatorSection, description: Any, problems: Problems) -> tuple[float, float]:
+def _times(section: SimulatorSection, description: Any, interface: str, problems: Problems) -> tuple[float, float]:
     """(end of the flight, step between two rows), by default of the FMU's own experiment."""
     stop = section.stop_time_s or _experiment(description, "stopTime")
     if stop is None:
         problems.append(("stop_time_s", "is missing, and the FMU proposes none"))
         return 1.0, 1.0
+    if section.stop_time_s is None and (start := _experiment(description, "startTime")):
+        message = f"is missing; the FMU proposes {start:g} to {stop:g} s, and a flight begins at 0 s"
+        problems.append(("stop_time_s", message))
     step = section.step_s or _experiment(description, "stepSize") or stop / 1000.0
     if not step <= stop <= MOST_STEPS * step:
         problems.append(
             ("step_s", f"{step:g} must be at most {stop:g}, the end, and give {MOST_STEPS:,} steps at most")
         )
+    elif interface == CO_SIMULATION and not isclose((steps := round(stop / step)) * step, stop, rel_tol=1e-9):
+        cosimulation = description.coSimulation
+        if cosimulation is not None and not cosimulation.canHandleVariableCommunicationStepSize:
+            better = f"{stop / steps:.12g} s would fit"
+            problems.append(
+                ("step_s", f"the FMU takes steps of one length, and {step:g} s do not divide {stop:g} s; {better}")
+            )
     return stop, step
 
 

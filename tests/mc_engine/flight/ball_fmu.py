@@ -15,7 +15,7 @@ C = r"""
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
-typedef struct { double t, v[10]; } Ball;  /* by value reference: mass 1, area 2, height 3, speed 4, altitude 5 */
+typedef struct { double t, v[12]; } Ball;  /* by value reference: mass 1, area 2, height 3, speed 4, altitude 5 */
 static const double G = 9.81;
 static double k(Ball *b) { return b->v[2] * 1.225 / 2 / b->v[1]; }
 static double limit(Ball *b) { return sqrt(G / k(b)); }
@@ -39,7 +39,7 @@ static int set(Ball *b, const unsigned *r, size_t n, const double *x) { EACH(i, 
   void fmi##FreeInstance(void *b) { free(b); } \
   int fmi##ExitInitializationMode(void *b) { initialized(b); return 0; } \
   int fmi##Terminate(void *b) { return 0; } \
-  int fmi##Reset(void *b) { start(b); return 0; } \
+  int fmi##Reset(void *b) { RESET; start(b); return 0; } \
   int fmi##SetTime(void *b, double t) { ((Ball *)b)->t = t; return 0; } \
   int fmi##EnterEventMode(void *b) { return 0; } \
   int fmi##EnterContinuousTimeMode(void *b) { return 0; } \
@@ -60,6 +60,9 @@ int fmi2SetupExperiment(void *b, int d, double tolerance, double t, int s, doubl
 int fmi2EnterInitializationMode(void *b) { return 0; }
 int fmi2GetReal(void *b, const unsigned *r, size_t n, double *x) { return got(b, r, n, x); }
 int fmi2SetReal(void *b, const unsigned *r, size_t n, const double *x) { return set(b, r, n, x); }
+int fmi2SetInteger(Ball *b, const unsigned *r, size_t n, const int *x) { EACH(i, n) b->v[r[i]] = x[i]; return 0; }
+int fmi2GetInteger(Ball *b, const unsigned *r, size_t n, int *x) { EACH(i, n) x[i] = b->v[r[i]]; return 0; }
+int fmi2GetBoolean(Ball *b, const unsigned *r, size_t n, int *x) { EACH(i, n) x[i] = b->v[5] < 0; return 0; }
 int fmi2DoStep(void *b, double t, double step, int n) { return stepped(b, t + step); }
 int fmi2CompletedIntegratorStep(void *b, int n, int *event, int *end) { *event = *end = 0; return 0; }
 int fmi2NewDiscreteStates(void *b, struct { int more, end, nominals, values, defined; double next; } *i) {
@@ -90,6 +93,11 @@ def _fmi2():
                for place, (name, (ref, _)) in enumerate(DERIVATIVES.items()))]  # fmt: skip
     lines = [f'<ScalarVariable name="{name}" valueReference="{ref}" {kind}><Real {more}/></ScalarVariable>'
              for name, kind, ref, more in known]  # fmt: skip
+    lines += [
+        '<ScalarVariable name="number" valueReference="10" causality="parameter" variability="fixed" '
+        'initial="exact"><Integer start="1"/></ScalarVariable>',
+        '<ScalarVariable name="landed" valueReference="11" variability="discrete"><Boolean/></ScalarVariable>',
+    ]
     outputs = "".join(f'<Unknown index="{place}"/>' for place in range(4, 8))
     states = '<Unknown index="8"/><Unknown index="9"/>'
     return f"""<?xml version="1.0" encoding="UTF-8"?>
@@ -119,14 +127,17 @@ def _fmi3():
 <ModelStructure>{structure}</ModelStructure></fmiModelDescription>"""
 
 
-def ball_fmu(path, fmi=2, fault="", platform=None):
-    """Write the FMU.  fault : lines of C in each step.  platform : of its library, by default this machine's."""
+def ball_fmu(path, fmi=2, fault="", platform=None, reset=""):
+    """Write the FMU.
+
+    fault, reset : lines of C in each step, and in each reset.  platform : of its library, by default this machine's.
+    """
     import fmpy
 
     source, library = path.with_suffix(".c"), path.with_suffix(".so")
     headers = (Path(fmpy.__file__).parent / "c-code").glob("fmi[23]Functions.h")
     names = {name for header in headers for name in re.findall(r"\b(fmi[23]\w+)TYPE\s+fmi", header.read_text())}
-    code = C.replace("FAULT", fault)
+    code = C.replace("FAULT", fault).replace("RESET", reset)
     there = {*re.findall(r"\b(fmi[23]\w+)\(", code)}
     there |= {f"fmi{version}{name}" for version in "23" for name in re.findall(r"fmi##(\w+)", C)}
     idle = [f"int {name}(void) {{ return 3; }}" for name in sorted(names - there)]  # which no case calls

@@ -5,6 +5,7 @@ import pytest
 
 from mc_engine import CampaignError, load_campaign, replay, run
 from mc_engine.flight.fmu_flight import taken
+from tests.mc_engine.flight import ball_fmu
 from tests.mc_engine.flight.ball_fmu import fmu_campaign
 from tests.mc_engine.flight.falling_ball import python_campaign
 
@@ -62,6 +63,27 @@ def test_a_case_of_an_fmu_does_not_depend_on_those_before(tmp_path):
     assert one.equals(run(campaign, tmp_path / "two", workers=2, chunk=3).cases())
 
 
+def test_an_fmu_that_cannot_be_reset_is_begun_anew(tmp_path, ball):
+    table = run(load_campaign(fmu_campaign(tmp_path / "ball", cases=FEW, reset="return 3")), tmp_path / "run").cases()
+    assert np.allclose(table[METRICS], ball[METRICS], rtol=1e-14, atol=0.0)
+
+
+def test_whole_numbers_and_truth_values_of_an_fmu_are_as_recorded(tmp_path):
+    file = fmu_campaign(tmp_path / "ball", cases=FEW, metrics='landed = {}\nflown = { variable = "number" }')
+    numbers = "[simulator.parameter]\nnumber = { default = 1 }"
+    text = file.read_text().replace("[simulator.parameter]", numbers) + "landed = {}\n"
+    file.write_text(f'{text}[dispersion.number]\ndist = "discrete"\nvalues = [2, 2.5]\n')
+    store = run(load_campaign(file), tmp_path / "run", workers=1)
+    table = store.cases()
+    whole = (table["number"] == 2.0).to_numpy()
+    assert 0 < whole.sum() < FEW
+    assert list(table["flown"][whole]) == [2.0] * whole.sum()
+    assert set(table["landed"][whole]) == {1.0}
+    assert set(store.histories()["landed"]) == {0.0, 1.0}
+    assert set(table["status"][~whole]) == {"refused"}
+    assert table["reason"][~whole].str.startswith('number is 2.5, and "number" is a whole number').all()
+
+
 @pytest.mark.parametrize(
     ("fault", "status", "reason"),
     [
@@ -110,6 +132,15 @@ def test_mistakes_in_the_table_of_an_fmu_are_sentences(tmp_path, mistake):
     with pytest.raises(CampaignError) as error:
         load_campaign(file)
     assert sentence in str(error.value)
+
+
+def test_steps_of_one_length_must_meet_the_end_of_the_flight(tmp_path, monkeypatch):
+    description = ball_fmu._fmi3().replace('canHandleVariableCommunicationStepSize="true"', "")
+    monkeypatch.setattr(ball_fmu, "_fmi3", lambda: description)  # which takes no shorter step at the end
+    file = fmu_campaign(tmp_path / "ball", fmi=3)
+    file.write_text(file.read_text().replace("step_s = 0.05", "step_s = 0.3"))
+    with pytest.raises(CampaignError, match=r"and 0\.3 s do not divide 20 s; 0\.298507462687 s would fit"):
+        load_campaign(file)
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
