@@ -69,6 +69,10 @@ def _csv_columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]
     names = [_without_guard(cell) for cell in next(filled, (0, []))[1]]
     if not names:
         raise FileFault(f'"{path.name}" is empty')
+    if len(names) == 1 and (";" in names[0] or "\t" in names[0]):
+        raise FileFault(
+            f'"{path.name}" has semicolons or tabs between its columns; put commas there, and points in numbers'
+        )
     _check_names(path, names)
     columns: list[list[str]] = [[] for _ in names]
     most, ragged = MOST_CSV_CELLS // len(names), []

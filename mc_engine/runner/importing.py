@@ -162,7 +162,8 @@ def _compare(
         wrong = np.flatnonzero(np.char.lower(given.astype(str)) != np.char.lower(drawn.astype(str)))
         texts = [str(column[wrong[0]]) for column in (given, drawn)] if wrong.size else []
     if wrong.size:
-        message = f"case {wrong[0]} has {texts[0]}, and the campaign draws {texts[1]}; {wrong.size:,} cases differ"
+        differ = "1 case differs" if wrong.size == 1 else f"{wrong.size:,} cases differ"
+        message = f"case {wrong[0]} has {texts[0]}, and the campaign draws {texts[1]}; {differ}"
         if nominal:
             message = f"case -1 has {texts[0]}, and the nominal value of the campaign is {texts[1]}"
         problems.append(Problem(name, f"{message}; `mc-engine sample` gives the inputs"))

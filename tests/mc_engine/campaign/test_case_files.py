@@ -37,6 +37,7 @@ def test_a_faulty_file_is_refused_with_row_and_column(tmp_path):
         ("a,b\n1,2\n", None, "has 2 columns; say which"),
         ("a,b\n1,2\n", "c", 'has no column "c"; it has a, b'),
         ("a,a\n1,2\n", "a", 'has the column "a" twice'),
+        ("a;b\n1,5;2\n", "a", "has semicolons or tabs between its columns; put commas there, and points in numbers"),
         ("a,\n1,2\n", "a", "a column without a name"),
         ("a,b\n1\n", "a", "line 2: 1 fields where 2 columns are named"),
         ("a\n1\nx\n", None, 'row 2, column "a": "x" is not a finite number'),

@@ -195,7 +195,7 @@ def test_results_of_other_inputs_are_refused(tmp_path, flown):
     campaign = load_campaign(python_campaign(tmp_path / "ball"))
     table.loc[7, "mass_kg"] += 1e-3
     table.to_csv(tmp_path / "results.csv", index=False)
-    with pytest.raises(CampaignError, match=r"mass_kg: case 7 has .* and the campaign draws .*; 1 cases differ"):
+    with pytest.raises(CampaignError, match=r"mass_kg: case 7 has .* and the campaign draws .*; 1 case differs"):
         import_results(campaign, tmp_path / "results.csv", tmp_path / "run")
     table.drop(index=50).to_csv(tmp_path / "results.csv", index=False)
     with pytest.raises(CampaignError, match="case_id: case 50 is missing"):
