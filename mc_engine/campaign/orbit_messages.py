@@ -21,6 +21,8 @@ NO_EPOCH = "is not an epoch such as 2026-01-31T12:00:00"
 _REPEATED = "MAN_"  # how the keywords of an OPM begin that each of its manoeuvres has again
 _SAME = {"RSW": "RTN", "RIC": "RTN"}  # other names of the same axes
 _ENTRIES = tuple((f"C{row}_{column}", i, j) for i, row in enumerate(AXES) for j, column in enumerate(AXES[: i + 1]))
+_UNITS = {name: "km/s" if name.endswith("DOT") else "km" for name in AXES}  # of keywords, which may be written out
+_UNITS |= {name: ("km**2", "km**2/s", "km**2/s**2")[(i > 2) + (j > 2)] for name, i, j in _ENTRIES}
 
 
 class MessageFault(Exception):
@@ -98,7 +100,10 @@ def _opm(lines: list[tuple[int, str]]) -> UncertainState:
             raise MessageFault(f'line {number}: "{line[:40]}" is not KEYWORD = value')
         if key in facts and not key.startswith(_REPEATED):
             raise MessageFault(f"line {number}: {key} is there already, in line {facts[key][0]}; leave one of them out")
-        facts[key] = (number, re.sub(r"\s*\[[^]]*\]$", "", value))
+        value, _, unit = value.removesuffix("]").partition("[")
+        if unit and key in _UNITS and unit.replace(" ", "").replace("^", "**").lower() != _UNITS[key]:
+            raise MessageFault(f"line {number}: {key} is in [{unit}]; the standard has it in [{_UNITS[key]}]")
+        facts[key] = (number, value.rstrip())
     missing = [
         name for name in ("EPOCH", "REF_FRAME", *AXES, *(entry for entry, _, _ in _ENTRIES)) if name not in facts
     ]
@@ -179,7 +184,7 @@ def _moment(line: int, text: str) -> datetime:
 
 def moment_of(text: str) -> datetime | None:
     """An epoch, calendar date or day of the year; None if the text is none."""
-    plain = text.rstrip("Z")
+    plain = re.sub(r"(\.[0-9]{6})[0-9]+$", r"\1", text.rstrip("Z"))  # to the microsecond
     for form in ("%Y-%m-%dT%H:%M:%S.%f", "%Y-%m-%dT%H:%M:%S", "%Y-%jT%H:%M:%S.%f", "%Y-%jT%H:%M:%S"):
         try:
             return datetime.strptime(plain, form)

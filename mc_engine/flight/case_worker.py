@@ -180,6 +180,7 @@ class Worker:
             return self._called(_read_batch, inputs, cases, order)
         finally:
             shutil.rmtree(self._work / folder_name(int(order.noise[0])), ignore_errors=True)
+            _empty_streams()
 
     def _called(self, read: Callable[..., Any], inputs: Mapping[str, Any], case: Any, how: Any) -> Any:
         """What `read` finds in what the function returns, or Flown with the status of what is wrong with it."""

@@ -79,7 +79,8 @@ frame = "EME2000"
 def opm(covariance_frame=""):
     """The example as a message."""
     facts = {"CCSDS_OPM_VERS": "3.0", "REF_FRAME": "EME2000", "EPOCH": "1998-12-18T14:28:15.1172"}
-    facts |= {name: f"{value} [km]" for name, value in zip(AXES, STATE, strict=True)}
+    units = 3 * ["km"] + 3 * ["km/s"]
+    facts |= {name: f"{value} [{unit}]" for name, value, unit in zip(AXES, STATE, units, strict=True)}
     facts |= {"COV_REF_FRAME": covariance_frame} if covariance_frame else {}
     facts |= {f"C{a}_{b}": MATRIX[i, j] for i, a in enumerate(AXES) for j, b in enumerate(AXES[: i + 1])}
     return "\n".join(f"{key} = {value}" for key, value in facts.items())
@@ -156,6 +157,14 @@ def test_a_covariance_without_a_frame_is_in_that_of_its_segment_whatever_frame_t
     head, one, two, three = oem(*epochs).split("EPOCH = ")
     text = "EPOCH = ".join([head, one, two.replace("COV_REF_FRAME = RTN\n", ""), three])
     assert [state.covariance_frame for state in read_message(text)] == ["RTN", "EME2000", "RTN"]
+
+
+def test_units_and_epochs_that_a_message_writes_out_are_read():
+    read = read_message(opm().replace("CX_X = ", "CX_X = 0").replace("\nCY_X", " [km ** 2]\nCY_X"))[0]
+    assert np.array_equal(read.covariance, MATRIX)
+    with pytest.raises(MessageFault, match=r"line 10: CX_X is in \[m\*\*2\]; the standard has it in \[km\*\*2\]"):
+        read_message(opm().replace("\nCY_X", " [m**2]\nCY_X"))
+    assert read_message(oem("1998-12-18T14:28:15.117200000"))[0].state is not None  # to the nanosecond
 
 
 @pytest.mark.parametrize("place", [0, 1])
