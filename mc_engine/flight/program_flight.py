@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -96,8 +96,11 @@ class ProgramFlight:
             return flown(CRASHED, f"{Path(command[0]).name} cannot be started: {error.strerror}")
         finally:
             end_children(set())
-        (folder / "stdout.txt").write_bytes(ended.stdout[-MOST_STDERR:])
-        (folder / "stderr.txt").write_bytes(ended.stderr)
+        for name, written in (("stdout.txt", ended.stdout[-MOST_STDERR:]), ("stderr.txt", ended.stderr)):
+            # without, where the program removed its folder or has a folder of that name
+            with suppress(FileNotFoundError, IsADirectoryError, PermissionError):
+                (folder / name).unlink(missing_ok=True)
+                (folder / name).write_bytes(written)
         if sentence := self._ended_badly(ended):
             return flown(*sentence)
         try:

@@ -56,6 +56,7 @@ C_FAULTS = {
     "exit": ('fprintf(stderr, "licence lost\\n"); return 3;', "crashed", "ended with exit code 3: licence lost"),
     "nothing": ("return 0;", "no-result", "wrote no result.json"),
     "half": ('file = fopen(argv[2], "w"); fprintf(file, "{\\"time\\": 1."); return 0;', "no-result", "cannot be read"),
+    "no folder": ('system("rm -rf \\"$PWD\\""); return 0;', "no-result", "wrote no result.json"),
     "previous": ("mass = 10.0;", "no-result", "the program used mass_kg = 10"),
 }
 
