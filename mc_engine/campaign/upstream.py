@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from hashlib import sha256
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -170,8 +171,6 @@ def link(rows: Rows, section: InputsSection, model: System, own_columns: Iterabl
     """
     upstream = {column.name: column for column in rows.columns}
     links = _links(upstream, section, model, findings)
-    if rows.n_cases and rows.nominal.get("status", STATUS_NAME[OK]) != STATUS_NAME[OK]:
-        findings.add("from", f"the nominal case of that run ended as {rows.nominal['status']}; choose one that flies")
     failed = np.asarray(rows.table["status"] != STATUS_NAME[OK], dtype=bool)
     table: dict[str, np.ndarray] = {}
     nominal: dict[str, Scalar] = {}
@@ -181,6 +180,13 @@ def link(rows: Rows, section: InputsSection, model: System, own_columns: Iterabl
         values = rows.table[column].astype(np.float64)
         table[name] = np.where(failed, np.nan, convert(values, unit, item.unit))
         nominal[name] = float(convert(float(rows.nominal[column]), unit, item.unit))
+    lost = [name for name, value in nominal.items() if not isfinite(float(value))]
+    if rows.n_cases and rows.nominal.get("status", STATUS_NAME[OK]) != STATUS_NAME[OK]:
+        ended = f"{rows.nominal['status']} ({rows.nominal.get('reason', '')})"
+        findings.add("from", f"the nominal case of that run ended as {ended}; take a run whose nominal case completed")
+    elif lost:
+        what = f'"{lost[0]}" takes "{links[lost[0]]}", which is no finite number in the nominal case of that run'
+        findings.add("from", f"{what}; take another column or run")
     kept = [input_column(inputs[name]) for name in links]
     names: dict[str, str] = {}
     used, prefix = {*own_columns, *_OURS, *inputs}, re.sub(r"\W+", "_", rows.facts["name"])

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from hashlib import sha256
 
 import numpy as np
@@ -9,6 +10,9 @@ import pandas as pd
 import pytest
 
 from mc_engine.campaign.loading import load_campaign
+from mc_engine.campaign.reading import Findings
+from mc_engine.campaign.sections import InputsSection
+from mc_engine.campaign.upstream import link, read_rows
 from mc_engine.errors import CampaignError, EngineError, StoreError
 from mc_engine.runner.runner import extend, replay, rerun, resume, run
 from mc_engine.store.journal import encode, scan
@@ -191,6 +195,23 @@ def test_what_does_not_fit_is_said_with_its_place(folder):
         with pytest.raises(CampaignError) as caught:
             load_campaign("second", text=text.replace(*change), directory=folder / "second")
         assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("nominal", "message"),
+    [
+        (
+            {"top_m": float("nan")},
+            '"height_km" takes "top_m", which is no finite number in the nominal case of that run',
+        ),
+        ({"status": "no-result", "reason": "not imported"}, "the nominal case of that run ended as no-result (not imp"),
+    ],
+)
+def test_a_run_whose_nominal_case_has_no_number_is_refused(folder, nominal, message):
+    rows, second, findings = read_rows(folder / "runs" / "first"), load_campaign(folder / "second"), Findings()
+    section = InputsSection.model_validate({"from": "first", "columns": {"height_km": "top_m"}})
+    link(replace(rows, nominal={**rows.nominal, **nominal}), section, second.model, (), findings)
+    assert [message in str(problem) for problem in findings.problems] == [True]
 
 
 def test_a_run_to_take_inputs_from_is_refused_where_the_campaign_takes_none(folder, tmp_path):
