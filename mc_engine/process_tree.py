@@ -103,3 +103,22 @@ def die_with_parent(parent: int, by: int) -> None:
         ctypes.CDLL(None).prctl(_SET_PARENT_SIGNAL, by)
         if os.getppid() != parent:  # it died before
             os._exit(1)
+
+
+def let_forks_be_terminated() -> None:
+    """From now on, processes that this one forks end by SIGTERM, whatever handler this one has.
+
+    Python forgets a signal for its handlers that comes while a process is forked, and a pool waits for a process that
+    it terminated.  So SIGTERM is kept back until the new process has no handler.
+    """
+    mask = [signal.SIGTERM]
+
+    def in_child() -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, mask)
+
+    os.register_at_fork(
+        before=lambda: signal.pthread_sigmask(signal.SIG_BLOCK, mask),
+        after_in_parent=lambda: signal.pthread_sigmask(signal.SIG_UNBLOCK, mask),
+        after_in_child=in_child,
+    )

@@ -201,6 +201,12 @@ def test_what_a_function_does_to_its_process_ends_with_its_case(tmp_path, monkey
     assert json.loads(Path("run/simulator/case-0000001/case.json").read_text())["height_m"] == table["height_m"][1]
 
 
+def test_a_function_may_use_a_pool_of_processes(tmp_path):
+    fault = "import multiprocessing as many\nwith many.get_context('fork').Pool(2) as pool:\n    pool.map(abs, [1.0])"
+    file = python_campaign(tmp_path / "ball", cases=20, fault=fault, options="time_limit_s=5.0,")
+    assert run(load_campaign(file), tmp_path / "run", workers=1).status_counts() == {"ok": 20}
+
+
 RESULTS = {
     "mark": ('\ufeff{"time": 1.5}', "ok", ""),
     "text": ('{"time": " -2.5E1 "}', "ok", ""),
