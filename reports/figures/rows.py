@@ -75,7 +75,8 @@ def difference_scale(estimates: np.ndarray) -> ChangeScale:
 
 def ratio_scale(estimates: np.ndarray) -> ChangeScale:
     """For ratios float64[n, 3]: logarithmic."""
-    low, high = np.exp(_reach(np.log(estimates))).tolist()
+    with np.errstate(divide="ignore"):  # an interval without a lower end
+        low, high = np.exp(_reach(np.log(estimates))).tolist()
     return ChangeScale(1.0, Axis(reach=(low, high), log=True), np.asarray)
 
 
@@ -107,6 +108,7 @@ def change_panel(
     estimates : float64[n, 3], value and ends of its interval, NaN where not defined.  significant : bool[n].
     """
     at, low, high = scale.places(estimates).T
+    low, high = np.clip((low, high), *(scale.axis.reach or (-np.inf, np.inf)))  # ends may be infinite
     marks: list[Mark] = [Limit(scale.unchanged, "x", INK, "no change", "dash", 1.0, key="no change")]
     for sure, colour, sign, key in (
         (False, BLUE, "circle", "not significant"),

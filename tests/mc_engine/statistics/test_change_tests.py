@@ -134,6 +134,28 @@ def test_a_spread_that_grows_by_three_tenths_is_found_and_is_no_shift(paired):
     assert found.ratio.value == pytest.approx(1.3, rel=0.08)
 
 
+@pytest.mark.parametrize(("together", "n"), [(0.9, 200), pytest.param(0.0, 200, marks=pytest.mark.slow), (0.9, 20)])
+def test_the_spread_of_pairs_with_long_tails_gives_no_more_false_alarms_than_stated(monkeypatch, together, n):
+    """Ranks of the distances gave 22 % in place of 5 % with 200 pairs of log-normal numbers, and 9 % with 20."""
+    monkeypatch.setattr(change_tests, "_root", lambda score, level, start, step: start)  # no interval is asked for
+    alarms = []
+    for seed in range(400):
+        a, own = normal("a", seed, n), normal("b", seed, n)
+        b = together * a + np.sqrt(1.0 - together**2) * own
+        alarms.append(metric_change("y", np.exp(1.5 * a), np.exp(1.5 * b), paired=True).spread_p <= 0.05)
+    assert np.mean(alarms) <= 0.065
+
+
+@pytest.mark.parametrize("paired", [False, True])
+def test_a_ratio_of_spreads_that_too_few_cases_do_not_bound_has_open_ends(paired):
+    """Nine equal numbers and one far from them, in each run: the largest score is 1."""
+    a, b = np.zeros(10), np.zeros(10)
+    a[3], b[5] = 1.0, 2.0
+    found = metric_change("y", a, b, paired=paired)
+    assert (found.ratio.value, found.ratio.lower, found.ratio.upper) == (pytest.approx(2.0), 0.0, np.inf)
+    assert found.spread_p > 0.05
+
+
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("paired", [False, True])
 def test_where_ties_let_the_score_jump_at_no_change_the_size_is_none(paired, size):
@@ -145,7 +167,6 @@ def test_where_ties_let_the_score_jump_at_no_change_the_size_is_none(paired, siz
     assert 0.0 in (change.shift.lower, change.shift.upper)
     words = _with_interval(change.shift_in_sigma)
     assert words in ("0 [0, 0]", "0.00 [-0.45, 0.00]")
-    assert not paired or change.ratio.value == 1.0
 
 
 def test_a_shift_far_below_the_error_of_one_case_is_found_in_pairs():

@@ -6,7 +6,7 @@ import pytest
 from mc_engine.statistics.drivers import SuccessCurve
 from reports.drawing.marks import Axis, Limit, Line, Plot, Points
 from reports.drawing.strokes import Frame, stroked
-from reports.figures.rows import change_panel, difference_scale, tornado
+from reports.figures.rows import change_panel, difference_scale, ratio_scale, tornado
 from reports.figures.statistics import correlation_matrix, success_panel
 
 EFFECTS = np.array([[0.5, 0.4, 0.6], [0.2, 0.1, 0.3]])
@@ -72,3 +72,10 @@ def test_the_cells_of_a_correlation_matrix_stand_at_their_row_and_column():
 def test_dashes_and_rings_are_drawn_on_paper(mark, sign):
     (stroke,) = Plot((mark,), Axis(reach=(0.0, 1.0)), Axis(reach=(0.0, 1.0))).strokes
     assert sign in "".join(stroked(stroke, FRAME))
+
+
+def test_intervals_without_ends_reach_the_edges_of_their_panel():
+    ratios = np.array([[2.0, 0.0, np.inf], [1.0, 0.5, 2.0]])
+    scale = ratio_scale(ratios)
+    plot = change_panel("spread", ["a", "b"], ratios, np.zeros(2, dtype=bool), scale, "90 %")
+    assert [scale.axis.reach[0], 0.0, scale.axis.reach[1], 0.0] in pieces(plot)
