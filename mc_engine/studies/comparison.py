@@ -95,6 +95,7 @@ class Comparison:
     names: tuple[str, str]
     titles: tuple[str, str]
     created: tuple[str, str]
+    designs: tuple[str, str]
     cases: tuple[int, int]
     ok: tuple[int, int]
     pairing: Pairing
@@ -129,8 +130,27 @@ class Comparison:
 
     @property
     def worse_verdicts(self) -> tuple[VerdictChange, ...]:
-        """Requirements with a worse verdict on the same cases; on other cases chance alone may change a verdict."""
-        return tuple(verdict for verdict in self.verdicts if verdict.worse) if self.pairing.paired else ()
+        """Requirements with a worse verdict on the same cases; on other cases chance alone may change a verdict.
+
+        None where a design gives no probabilities: its verdicts are not demonstrable, whatever the cases show.
+        """
+        comparable = self.pairing.paired and not self.chosen
+        return tuple(verdict for verdict in self.verdicts if verdict.worse) if comparable else ()
+
+    @property
+    def chosen(self) -> str:
+        """A sentence on the runs whose cases are no random sample; empty if there are none."""
+        runs = [
+            f"run {run} (design {design})"
+            for run, design in zip("AB", self.designs, strict=True)
+            if design not in SAMPLING_DESIGNS
+        ]
+        return (
+            f"the cases of {' and '.join(runs)} were chosen, not drawn at random: p-values and intervals, which are "
+            "those of random samples, do not hold for them"
+            if runs
+            else ""
+        )
 
     @property
     def changed(self) -> bool:
@@ -176,6 +196,7 @@ def compare_runs(
             manifests, lambda manifest: str(manifest["campaign"].get("title") or manifest["campaign"].get("name", ""))
         ),
         created=_both(manifests, lambda manifest: str(manifest.get("created_utc", ""))),
+        designs=_both(manifests, _design),
         cases=_both(tables, len),
         ok=_both(ok, lambda flown: int(flown.sum())),
         pairing=pairing,
@@ -280,11 +301,14 @@ def _verdict_changes(manifests: Any, tables: Any, ok: Any, pairing: Pairing) -> 
 
 def _judged(manifest: Mapping[str, Any], table: pd.DataFrame, flown: np.ndarray, looked: bool) -> dict[str, Verdict]:
     """The verdicts of a run by the names of its requirements, the joint one among them."""
-    design = str(manifest["campaign"].get("design", "mc"))
-    records = manifest.get("requirements", []) if design in SAMPLING_DESIGNS else []
+    records = manifest.get("requirements", [])
     columns = {record["metric"]: table[record["metric"]].to_numpy(dtype=np.float64) for record in records}
-    judged, joint = judge_all(records, columns.__getitem__, flown, design, looked)
+    judged, joint = judge_all(records, columns.__getitem__, flown, _design(manifest), looked)
     return {verdict.name: verdict for verdict in [*judged, *([joint] if joint else [])]}
+
+
+def _design(manifest: Mapping[str, Any]) -> str:
+    return str(manifest["campaign"].get("design", "mc"))
 
 
 def _verdict_on(name: str, judged: Mapping[str, Verdict]) -> Verdict | None:

@@ -28,6 +28,8 @@ def comparison_lines(comparison: Comparison) -> Iterator[str]:
     if len(comparison.shares) > 1:  # verdicts above are those of each run's own limits
         yield "cases completed, and inside the limits of run B in both runs:"
     yield from (_share_line(share, comparison.alpha) for share in comparison.shares)
+    if comparison.chosen:
+        yield f"note: {comparison.chosen}"
     yield answer(comparison)
 
 

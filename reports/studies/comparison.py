@@ -60,12 +60,12 @@ GLOSSARY = Terms(
         ("spread", "The ratio, run B over run A, of the distances from each run’s own median, estimated likewise."),
         (
             "tests",
-            "Paired: Wilcoxon’s signed ranks of the differences, and of the distances to each run’s own median; "
-            "McNemar’s exact test of a fraction. Unpaired: normal scores, Brown and Forsythe’s test, Fisher’s exact "
-            "test. Those of shifts and fractions are distribution-free; those of spread are approximate, with more "
-            "false alarms where a metric has a long tail on one side. Each size and interval of a metric is of the "
-            "quantity that its test is of: the interval excludes no change exactly where the test, by itself, finds "
-            "one.",
+            "Paired: Wilcoxon’s signed ranks of the differences, Student’s t of the distances to each run’s own median "
+            "(the paired form of Brown and Forsythe’s test), McNemar’s exact test of a fraction. Unpaired: normal "
+            "scores, Brown and Forsythe’s test, Fisher’s exact test. Those of shifts and fractions are "
+            "distribution-free; those of spread are approximate, with more false alarms where a metric has a long tail "
+            "and one of two unpaired runs has far fewer cases. Each size and interval of a metric is of the quantity "
+            "that its test is of: the interval excludes no change exactly where the test, by itself, finds one.",
         ),
         (
             "intervals",
@@ -184,11 +184,15 @@ def _change_cards(comparison: Comparison) -> Iterator[Card]:
 
 def _change_card(label: str, changed: int, detail: str) -> Card:
     """Of a change alone, which may be for the better: without a verdict."""
-    return Card(label, f"{count(changed)} changed", detail) if changed else Card(label, "no change", detail, "good")
+    return (
+        Card(label, f"{count(changed)} changed", detail) if changed else Card(label, "none significant", detail, "good")
+    )
 
 
 def _comparison_warnings(comparison: Comparison) -> tuple[str, ...]:
     sentences = [f"Not compared: {sentence}." for sentence in comparison.left_out]
+    if comparison.chosen:
+        sentences.append(f"{comparison.chosen[:1].upper()}{comparison.chosen[1:]}.")
     if not comparison.pairing.paired and any(verdict.worse for verdict in comparison.verdicts):
         sentences.append("The runs flew other cases: chance alone may have changed the verdict of a requirement.")
     return tuple(sentences)

@@ -13,7 +13,7 @@ from reports.figures.histories import Envelope
 from reports.footprint.landings import landed, planet_of
 from reports.run.flown import Flown
 from reports.run.history_bands import fair_cases, history_envelopes
-from reports.text.numbers import axis_label, count
+from reports.text.numbers import axis_label, count, percent
 
 MOST_PANELS = 9
 MOST_POINTS = 2000  # of each run
@@ -31,6 +31,8 @@ def overlay_blocks(runs: tuple[Flown, Flown], metrics: Sequence[str]) -> Iterato
     panels = tuple(panel for name in metrics[:MOST_PANELS] if (panel := _distribution(runs, name)) is not None)
     if panels:
         caption = "Distributions of the metrics that differ, significant changes first."
+        if max(run.n_held for run in runs) > 1.0 / TAILS[0]:
+            caption += f" Beyond the axes: at most {percent(TAILS[0], 1)} of the cases of each run, at either end."
         yield FigureBlock(caption, Drawing(FORM, panels, 3), "small")
     drawn = dict(_histories(runs))
     panels = tuple(item for item in drawn.values() if item is not None)[:MOST_PANELS]
@@ -53,9 +55,8 @@ def _distribution(runs: tuple[Flown, Flown], name: str) -> Plot | None:
     values = [numbers[np.isfinite(numbers)] for numbers in (run.values(name) for run in runs)]
     if min(value.size for value in values) == 0:
         return None
-    low, high = (
-        pick([np.quantile(value, tail) for value in values]) for pick, tail in zip((min, max), TAILS, strict=True)
-    )
+    low = min(np.quantile(value, TAILS[0], method="lower") for value in values)
+    high = max(np.quantile(value, TAILS[1], method="higher") for value in values)
     if not low < high:
         return None
     edges = np.linspace(low, high, BINS + 1)

@@ -159,3 +159,15 @@ def test_the_verb_answers_with_its_exit_status(tmp_path):
     assert "changed: shift of propellant_kg" in changed.output
     assert call("compare", tmp_path / "a", tmp_path / "c", "--alpha", "1e-30").exit_code == 0
     assert call("compare", tmp_path / "a", tmp_path / "c", "--tolerance", "100").exit_code == 0
+
+
+def test_a_requirement_is_not_demonstrable_on_chosen_cases_and_the_tests_are_said_not_to_hold(tmp_path):
+    """It was "pass → not required", beside p-values without a word."""
+    grid = {"name": "test", "cases": 400, "design": "grid", "seed": 1}
+    found = compared(run(tmp_path / "a"), run(tmp_path / "b", campaign=grid))
+    (fuel,) = found.verdicts
+    assert fuel.words == "pass → not demonstrable"
+    assert found.worse_verdicts == ()  # of the design alone
+    *_, note, _ = comparison_lines(found)
+    assert note.startswith("note: the cases of run B (design grid) were chosen, not drawn at random: p-values")
+    assert compared(run(tmp_path / "c"), run(tmp_path / "d")).chosen == ""

@@ -256,3 +256,16 @@ def test_a_significant_change_that_ties_hide_has_no_size_of_no_change():
     rows = tables(build_comparison(found))["Metrics of both runs"].rows
     (row,) = [row for row in rows if row[0].text.startswith("settling time")]
     assert (row[3].text, row[3].small, row[4].text[-2:]) == ("–", "ties", "\u202f*")
+
+
+def test_the_largest_and_the_smallest_of_few_cases_are_in_the_distributions():
+    runs = synthetic_run(40, failed=0), synthetic_run(40, failed=0, seed=2)
+    for made in runs:
+        made.campaign_text = "[campaign]"
+    document = build_comparison(compare_runs(*runs, ("a", "b")), runs)
+    (figure,) = [
+        block for block in blocks_of(document, FigureBlock) if block.caption.startswith("Distributions of the metrics")
+    ]
+    for plot in figure.drawing.plots:
+        for line in plot.marks:
+            assert line.y[1:-1:2].sum() == pytest.approx(1.0)
