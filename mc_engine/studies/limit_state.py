@@ -27,7 +27,7 @@ from mc_engine.status import OK, STATUS_NAME
 from mc_engine.suggestions import hint, listed
 
 FIRST_NOISE = 2**51
-_LEAST = float(np.nextafter(0.0, 1.0))
+AT_LIMIT = float(np.nextafter(0.0, 1.0))  # margin of a case right at its limit: inside, as little as can be
 
 
 class LimitState:
@@ -71,7 +71,7 @@ class LimitState:
             margin = np.where(able, np.minimum(upper - metric, metric - lower), -np.inf)
         # a case right at its limit is inside: the engine's word for it, safe from rounding of the difference
         inside = able & inside_limits(metric, requirement.at_most, requirement.at_least)
-        margin = np.where(inside, np.maximum(margin, _LEAST), np.minimum(margin, 0.0))
+        margin = np.where(inside, np.maximum(margin, AT_LIMIT), np.minimum(margin, 0.0))
         self.status.append(status)
         self.metric.append(metric)
         self._n, self._failed = self._n + len(u), self._failed + int(np.count_nonzero(~inside))

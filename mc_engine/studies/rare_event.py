@@ -26,7 +26,7 @@ from mc_engine.store.result_folder import write_result
 from mc_engine.store.run_files import RARE_EVENT, default_folder
 from mc_engine.store.store import refuse_occupied
 from mc_engine.store.writer_lock import writer_of_new
-from mc_engine.studies.limit_state import LimitState, chosen_requirement
+from mc_engine.studies.limit_state import AT_LIMIT, LimitState, chosen_requirement
 from mc_engine.studies.rare_event_folder import RareEventRecord, open_rare_event
 
 METHODS: dict[str, Callable[..., RareEvent]] = {"subset": subset_simulation, "cross-entropy": cross_entropy}
@@ -108,7 +108,7 @@ def _flown_cases(limit: LimitState, estimate: RareEvent) -> tuple[list[Column], 
         "status": np.concatenate(limit.status),
         **inputs,
         metric.name: np.concatenate(limit.metric),
-        "margin": cases.margin,
+        "margin": _distance(cases.margin),
     }
     return columns, arrays
 
@@ -130,7 +130,7 @@ def _result_record(limit: LimitState, estimate: RareEvent) -> dict[str, Any]:
         "cases": estimate.n_cases,
         "failed": int(estimate.cases.failed.sum()),
         "no_number": int(np.isneginf(estimate.cases.margin).sum()),
-        "levels": [{**asdict(level), "margin": _finite(level.margin)} for level in estimate.levels],
+        "levels": [{**asdict(level), "margin": _finite(float(_distance(level.margin)))} for level in estimate.levels],
         "inputs": inputs,
         "remarks": [*estimate.remarks, *remark],
     }
@@ -171,6 +171,11 @@ def _failed_inputs(limit: LimitState, estimate: RareEvent) -> tuple[list[dict[st
         for k, name in enumerate(limit.names)
     ]
     return records, [_SEVERAL] * apart
+
+
+def _distance(margin: np.ndarray | float) -> np.ndarray:
+    """Margins as distances: that of a case right at its limit, which is inside, is 0."""
+    return np.where(np.equal(margin, AT_LIMIT), 0.0, margin)
 
 
 def _finite(value: float) -> float | None:

@@ -222,10 +222,9 @@ def _failure_figure(record: RareEventRecord) -> FigureBlock | None:
         fewer=MOST,  # failed cases are not few here: larger, they would look like more than they are
         form="Failed cases over two inputs",
     )
-    caption = (
-        "Failed cases over the two inputs in which they lie farthest from the median. They are denser than the "
-        "dispersions draw them; their weights give their probabilities."
-    )
+    caption = "Failed cases over the two inputs in which they lie farthest from the median."
+    if record.result["method"] != "plain":
+        caption += " They are denser than the dispersions draw them; their weights give their probabilities."
     return FigureBlock(caption, drawing, "wide")
 
 

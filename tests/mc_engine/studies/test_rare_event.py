@@ -210,3 +210,46 @@ def test_a_campaign_has_to_say_what_failure_is():
     with pytest.raises(CampaignError, match="there are several; choose one of "):
         chosen_requirement(campaign, None)
     assert chosen_requirement(campaign, "fuel").metric == "propellant_kg"
+
+
+COUNTS = """
+import numpy as np
+from mc_engine import Parameter, Simulator
+from mc_engine.model import Field, inputs, metrics
+
+SIMULATOR = Simulator(
+    title="Counts",
+    parameters=inputs(a_pct=Parameter(0.0, "error")),
+    metrics=metrics(count=Field("pulses", unit="")),
+    fly=lambda x, case: {"count": np.round(x["a_pct"])},
+    batch=True,
+)
+"""
+COUNTED = """
+[campaign]
+simulator = "sim.py"
+cases = 100
+design = "mc"
+seed = 1
+[dispersion.a_pct]
+dist = "normal"
+sigma = 1.0
+[requirement.few]
+metric = "count"
+at_most = 1.0
+share = 0.9
+confidence = 0.9
+"""
+
+
+def test_a_case_right_at_its_limit_has_not_failed_and_its_margin_is_nothing(tmp_path):
+    """It was 4.9e-324 in the table of levels."""
+    (tmp_path / "sim.py").write_text(COUNTS)
+    campaign = load_campaign("counts", text=COUNTED, directory=tmp_path)
+    found = estimate_rare_event(campaign, out=tmp_path / "out", cases_per_level=500, workers=1)
+    at_limit = found.cases[found.cases["count"] == 1.0]
+    assert len(at_limit) > 50
+    assert set(at_limit["margin"]) == {0.0}
+    assert not at_limit["failed"].any()
+    assert found.result["levels"][1]["margin"] == 0.0
+    assert found.result["lower"] <= stats.norm.sf(1.5) <= found.result["upper"]
