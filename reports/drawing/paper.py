@@ -19,6 +19,7 @@ from reports.drawing.ticks import MOST_TICKS, axis_ticks, numerals
 WIDTH = 493.2  # 174 mm, the text width of the page
 SHORT = 0.46  # points of height on paper for a pixel on the screen
 GAP = 14.0  # between panels
+NAMES = 0.34 * WIDTH  # of the lines of words along an upright axis
 UPRIGHT, BETWEEN = 1.8 * TYPE, 5.0  # distance of tick labels of an upright axis; gap between those of another
 KEY_GAP = 12.0  # between entries of a key
 BAR = 14.0  # width of a colour scale and of the gap to its right
@@ -135,17 +136,25 @@ def _ticks(axis: Axis, ends: Ends, room: float, upright: bool) -> _Ticks:
 def _own_ticks(own: list[tuple[float, str]], room: float, upright: bool) -> _Ticks:
     """Words along an axis: in lines as wide as their slots, or turned where a word is wider."""
     places, slot = np.array([at for at, _ in own]), room / max(len(own), 1) - 4.0
-    ticks = _Ticks(places, [lettering.wrapped(text, 0.34 * WIDTH if upright else slot, 4) for _, text in own])
+    ticks = _Ticks(places, [lettering.wrapped(text, NAMES if upright else slot, 4) for _, text in own])
     if upright or ticks.widest <= slot:
         return ticks
     return _Ticks(places, [lettering.wrapped(text, 90.0, 2) for _, text in own], turned=True)
+
+
+def _room_of_words(axis: Axis) -> float:
+    """Height of an upright axis on which its own words do not overlap; 0 where none of them is broken into lines."""
+    own = axis.ticks or ()
+    lines = max((len(lettering.wrapped(text, NAMES, 4)) for _, text in own), default=0)
+    return LINE * lines * len(own) if lines > 1 else 0.0
 
 
 class _Panel:
     """One panel: computes the space that its texts take, then draws itself."""
 
     def __init__(self, plot: Plot, left: float, width: float):
-        self.plot, self.left, self.right, self.height = plot, left, left + width, SHORT * plot.height
+        self.plot, self.left, self.right = plot, left, left + width
+        self.height = max(SHORT * plot.height, _room_of_words(plot.y))
         self.title = lettering.wrapped(plot.title, (width - 4.0) / lettering.BOLD, 3)
         self.ends = plot.ends
         self.y_ticks = _ticks(plot.y, self.ends[1], self.height, True)
@@ -202,7 +211,7 @@ def _first_line(lines: list[str]) -> float:
 
 def _label(axis: Axis, ticks: _Ticks, room: float) -> list[str]:
     """The lines of an axis label, with the power of ten that its numbers leave out."""
-    return lettering.wrapped(" ".join(filter(None, (axis.label, ticks.power))), room, 2)
+    return lettering.wrapped(" ".join(filter(None, (axis.label, ticks.power))), room, 4)
 
 
 def _equal(x: Ends, y: Ends, width: float, height: float) -> tuple[Ends, Ends]:

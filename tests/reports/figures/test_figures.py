@@ -19,6 +19,7 @@ from reports.drawing.palette import INK
 from reports.drawing.strokes import Frame, stroked
 from reports.figures.distributions import bin_edges
 from reports.figures.histories import thinned
+from reports.figures.rows import margin_figure
 from reports.text.numbers import same_lengths
 
 PLOT = Plot((), Axis("x"), Axis("y"), "", 240.0)
@@ -172,3 +173,19 @@ def test_a_key_shows_its_marks_in_the_colours_of_the_page_and_of_paper():
     assert 'stroke="var(--ink)"' in paper.page_swatch(drawing.key[0])
     assert '"@ink' not in paper.svg(drawing)
     assert "&quot;@ink&quot;" in paper.svg(drawing)
+
+
+def test_names_of_rows_that_are_broken_into_lines_do_not_overlap():
+    names = [f"a requirement with a name that is far too long for one line, number {k}" for k in range(30)]
+    drawing = margin_figure(names, np.full((30, 2), 0.1), ["good"] * 30)
+    places = [float(y) for y in re.findall(r'<text x="[^"]*" y="([^"]*)"[^>]*text-anchor="end"', paper.svg(drawing))]
+    assert len(places) > 30
+    assert np.diff(np.sort(places)).min() >= 0.9 * lettering.LINE
+
+
+def test_a_label_too_long_for_its_panel_is_broken_into_lines():
+    label = Axis("a metric with a name of very many words that nobody would type twice in all his life [kg m²]")
+    plot = Plot((Points(np.arange(3.0), np.arange(3.0), INK),), label, Axis("y"))
+    panels = paper.svg(Drawing("three", (plot, plot, plot), 3))
+    lines = [text for text in re.findall(r">([^<]+)</text>", panels) if re.search("[a-z]{2}", text)]
+    assert max(map(lettering.width, lines)) <= paper.WIDTH / 3.0

@@ -206,3 +206,12 @@ def test_a_figure_that_continues_on_the_next_page_has_its_key_there_too(tmp_path
     assert len(pages) > 1
     assert many.drawing.key[-1].key == "required limit"
     assert [page.count("required limit") for page in pages] == [1] * len(pages)
+
+
+def test_the_list_of_contents_is_not_broken_at_the_end_of_the_first_page():
+    document = build(synthetic_run(300, failed=0), "run")
+    contents = tuple(replace(document.sections[-1], anchor=f"s{k}", title=f"Entry {k}") for k in range(12))
+    full = replace(document, verdicts=document.verdicts[:1] * 12, sections=contents)
+    pages = [page.extract_text() for page in pypdf.PdfReader(io.BytesIO(render_pdf(full))).pages]
+    listed = next(text for text in pages if "Contents" in text).partition("Contents")[2]
+    assert all(f"Entry {k}" in listed for k in range(12))
