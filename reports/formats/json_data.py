@@ -37,6 +37,8 @@ class Counts(_Record):
 class RequirementRecord(_Record):
     """A requirement and what the cases demonstrate.
 
+    observed_probability : the fraction of the cases inside the limits, passed / tried; None, as are all other figures
+        of a probability, for a design without probabilities, such as a grid.
     demonstrated_probability : the lower confidence bound on the probability of keeping the limits.
     demonstrated : the tolerance limit of the metric that holds with the required probability and confidence;
         `enclosed` in its place has two of them where there are two limits, both inside by the margin.
@@ -218,7 +220,7 @@ def _requirement_record(flown: Flown, verdict: Verdict) -> RequirementRecord:
         passed=verdict.passed,
         tried=verdict.tried,
         without_number=verdict.no_number,
-        observed_probability=verdict.estimate,
+        observed_probability=verdict.estimate if verdict.random else None,
         demonstrated_probability=verdict.lower,
         demonstrated=_finite(verdict.demonstrated),
         enclosed=verdict.enclosed,

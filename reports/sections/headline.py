@@ -88,7 +88,8 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
         probability = flown.stated.probability if large else flown.stated.low
         end, tail = summary.maximum if large else summary.minimum, summary.at(probability)
         rest.append(f"{'largest' if large else 'smallest'} {number(end, 4, spread)}")
-        rest += [f"{percentile(probability)} {number(tail.value, 4, spread)}"] if tail and flown.random else []
+        if tail and flown.random and (tail.upper if large else tail.lower) is not None:  # else it is the worst case
+            rest.append(f"{percentile(probability)} {number(tail.value, 4, spread)}")
         bound = demonstrated or f"{with_unit(number(end, 4, spread), unit)} in the cases flown"
         answer = f"at {'most' if large else 'least'} {bound}{_against(limits, unit)}"
         yield Card(flown.words(name), answer, f"{'; '.join([*rest, f'from {used}'])}.")

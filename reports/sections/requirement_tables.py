@@ -55,16 +55,20 @@ def _has_width(limits: Limits) -> bool:
 
 
 def requirement_table(flown: Flown) -> Table:
-    """The verification matrix: every requirement with what is demonstrated, its margin and verdict; all at once."""
-    columns = (
+    """The verification matrix: every requirement with what is demonstrated, its margin and verdict; all at once.
+
+    Of a design without probabilities, which demonstrates nothing, the fraction of its cases inside the limit.
+    """
+    shown = (
         Column("Requirement", "text"),
         Column("Limit", "text"),
-        Column("Demonstrated", "text"),
-        Column("Margin", "number"),
+        Column("Demonstrated", "text") if flown.random else None,
+        Column("Margin", "number") if flown.random else None,
         Column("Inside / tried", "number"),
-        Column("Demonstrated probability", "number"),
+        Column("Demonstrated probability" if flown.random else "Fraction of these cases", "number"),
         Column("Verdict", "text"),
     )
+    columns = tuple(column for column in shown if column is not None)
     records = flown.manifest.get("requirements", [])
     sources = [str(record.get("source") or "") for record in records]
     rows = [_requirement_row(flown, *pair) for pair in zip(flown.verdicts, sources, strict=True)]
@@ -72,17 +76,20 @@ def requirement_table(flown: Flown) -> Table:
         "Margin: from the demonstrated bound (tolerance limit) to the nearest limit; in brackets, relative to the "
         "size of the limit, or to half the distance between two. Of two limits, the demonstrated bounds are both as "
         "far inside, or outside, as the margin. Bounds and margins are rounded to the unfavourable side. "
-        f"Demonstrated probability: observed fraction of the cases, in brackets {_bounds_named(flown)}. A failed case, "
-        "or one whose metric is not a number, counts as outside."
+        f"Demonstrated probability: observed fraction of the cases, in brackets {_bounds_named(flown)}. "
+        if flown.random
+        else "The cases were chosen, not drawn at random: a fraction of them is no probability, demonstrated or not. "
     )
+    note += "A failed case, or one whose metric is not a number, counts as outside."
     if flown.joint is not None:
         rows.append(_requirement_row(flown, flown.joint, ""))
+        note += " All at once: cases inside every limit; required is 100 % less what each requirement may miss."
         note += (
-            " All at once: cases inside every limit; required is 100 % less what each requirement may miss. It "
-            "passes where that is demonstrated and every requirement passes, and fails where one of them fails with "
-            "confidence shared (next table)."
-        )
-    return Table("Verification matrix", columns, tuple(rows), note)
+            " It passes where that is demonstrated and every requirement passes, and fails where one of them fails "
+            "with confidence shared (next table)."
+        ) * flown.random
+    kept = [tuple(cell for cell, column in zip(row, shown, strict=True) if column is not None) for row in rows]
+    return Table("Verification matrix", columns, tuple(kept), note)
 
 
 def _bounds_named(flown: Flown) -> str:

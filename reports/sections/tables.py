@@ -42,7 +42,7 @@ def limit_text(verdict: Verdict, unit: str) -> str:
 
 
 def summary_table(flown: Flown) -> Table:
-    """Moments and range of every metric that has a number, beside its nominal value; the shape of a random sample."""
+    """Moments and range of every metric, beside its nominal value; the shape of a random sample."""
     columns = (
         Column("Metric", "text"),
         Column("Used / tried", "number"),
@@ -56,8 +56,6 @@ def summary_table(flown: Flown) -> Table:
     rows = []
     for name, summary in flown.summaries.items():
         nominal = flown.nominal_value(name)
-        if not summary.n_used:
-            continue
         cells = [(value, number(value, scale=summary.spread)) for value in (nominal, summary.mean)]
         cells += [(summary.sd, "0" if summary.constant and summary.sd else number(summary.sd, scale=summary.spread))]
         cells += [(value, number(value, scale=summary.spread)) for value in (summary.minimum, summary.maximum)]
@@ -90,7 +88,6 @@ def range_table(flown: Flown) -> Table:
             *(_end_cell(flown, name, summary, end) for end in (summary.minimum, summary.maximum)),
         )
         for name, summary in flown.summaries.items()
-        if summary.n_used
     )
     note = (
         "Used / tried: cases with a number, of all cases flown. Small: the case with this value, and its inputs "
@@ -102,7 +99,7 @@ def range_table(flown: Flown) -> Table:
 
 def _end_cell(flown: Flown, name: str, summary: Summary, value: float | None) -> Cell:
     """The smallest or the largest value, and where it is: not known of a table that is a sample."""
-    if flown.sampled:
+    if flown.sampled or value is None:
         return Cell(number(value, scale=summary.spread), value)
     rows = np.flatnonzero(flown.values(name) == value)
     where = f"case {count(int(flown.case_ids[rows[0]]))}: {not_nominal(flown, int(rows[0]))}"
@@ -162,6 +159,8 @@ def quantile_table(flown: Flown) -> Table | None:
     note += (
         "a dash: too few cases for a limit." if flown.random else "Percentiles of the flown cases, not of a population."
     )
+    if any(summary.n_used < summary.n_tried for summary in drawn.values()):
+        note += " Where fewer cases are used than tried, they are of the cases with a number alone."
     return Table("Percentiles of the metrics", columns, tuple(rows), note)
 
 

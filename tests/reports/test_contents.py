@@ -195,6 +195,14 @@ def test_cases_of_a_grid_are_not_sold_as_probabilities():
     assert "do not estimate probabilities" in " ".join(document.warnings)
     assert "in the cases flown" in document.costs[0].answer
     assert "median" not in document.costs[0].detail
+    matrix = tables(document)["Verification matrix"]
+    assert [column.title for column in matrix.columns] == [
+        "Requirement", "Limit", "Inside / tried", "Fraction of these cases", "Verdict",
+    ]  # fmt: skip
+    assert "emonstrated prob" not in matrix.note
+    assert {len(row) for row in matrix.rows} == {5}
+    for record in [*document.data["requirements"], document.data["joint"]]:
+        assert (record.observed_probability, record.demonstrated_probability, record.margin) == (None, None, None)
     assert not {"Percentiles of the metrics", "Statistics of the metrics"} & {*tables(document)}
     keys = [mark.key for block in blocks_of(document, FigureBlock) for mark in block.drawing.key]
     assert [key for key in keys if "percentile" in key or key == "median"] == []
@@ -220,6 +228,12 @@ def test_the_metrics_of_a_grid_have_their_ends_and_the_cases_there():
         assert cell.small.startswith(f"{at.sum()} cases, first case {at.idxmax()}: ve ")
 
 
+@pytest.mark.parametrize(("n", "told"), [(3, False), (400, False), (900, True)])
+def test_a_percentile_that_is_only_the_worst_of_few_cases_is_no_key_result(n, told):
+    details = [card.detail for card in build(synthetic_run(n, failed=0), RUN).costs]
+    assert any("99.73rd percentile" in detail for detail in details) == told
+
+
 @pytest.mark.parametrize("n", [0, 1, 2])
 def test_hardly_any_cases_make_a_report_that_says_so(n):
     document = build(synthetic_run(n, failed=0), RUN)
@@ -232,6 +246,21 @@ def test_all_failed_is_said_first():
     document = build(synthetic_run(40, failed=40), RUN)
     assert document.warnings[0] == "All 40 cases failed: no metric has a number."
     assert all(card.answer == "no number" for card in document.costs)
+
+
+@pytest.mark.parametrize("design", ["mc", "grid"])
+def test_metrics_without_a_number_are_in_the_table_of_all_metrics(design):
+    run = synthetic_run(40, failed=40)
+    run.manifest["campaign"]["design"] = design
+    table = tables(build(run, RUN))["Statistics of the metrics" if design == "mc" else "Ranges of the metrics"]
+    assert [row[1].text for row in table.rows] == ["0 / 40"] * 8
+    assert {cell.text for row in table.rows for cell in row[3:]} == {"–"}
+
+
+def test_percentiles_of_completed_cases_are_said_to_be_of_them_alone():
+    for failed, said in ((0, False), (3, True)):
+        note = tables(build(synthetic_run(400, failed=failed), RUN))["Percentiles of the metrics"].note
+        assert note.endswith("they are of the cases with a number alone.") == said
 
 
 def test_a_campaign_without_requirements_figures_or_dispersions_still_reports():
