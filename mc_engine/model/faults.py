@@ -75,7 +75,17 @@ def naming_faults(reference: str, what: str, more: str = MORE) -> Iterator[None]
 def fault_of(error: Exception, reference: str) -> str:
     """The error of a model's own code in one line, with its place."""
     place, cause = _place_and_cause(error)
-    return f"{place or reference}: {cause}"
+    return f"{place or reference}: {cause}{_hint_of_module(error)}"
+
+
+def _hint_of_module(error: Exception) -> str:
+    """What to do about a module beside the model that one of its functions imports, when it runs."""
+    frame, _ = frame_in_model(error)
+    if not isinstance(error, ModuleNotFoundError) or frame is None or frame.f_code.co_name == "<module>":
+        return ""
+    beside = Path(frame.f_code.co_filename).parent / str(error.name)
+    found = beside.is_dir() or beside.with_name(f"{beside.name}.py").is_file()
+    return "; it lies beside the file: import it at the top, not in a function" if found else ""
 
 
 def fault_of_trial(error: Exception) -> str:

@@ -207,6 +207,13 @@ def test_a_function_may_use_a_pool_of_processes(tmp_path):
     assert run(load_campaign(file), tmp_path / "run", workers=1).status_counts() == {"ok": 20}
 
 
+def test_an_import_of_a_file_beside_that_comes_too_late_is_told_with_its_mend(tmp_path):
+    file = python_campaign(tmp_path / "ball", cases=2, fault="import gains")
+    (tmp_path / "ball/gains.py").write_text("GAIN = 1.0\n")
+    table = run(load_campaign(file), tmp_path / "run", workers=1).cases()
+    refuse_others(table, (0, 1), "crashed", "named 'gains'; it lies beside the file: import it at the top, not in a")
+
+
 RESULTS = {
     "mark": ('\ufeff{"time": 1.5}', "ok", ""),
     "text": ('{"time": " -2.5E1 "}', "ok", ""),
