@@ -105,9 +105,9 @@ def _about(flown: Flown, contributions: Contributions, metric: str, k: int) -> I
 def sigma_contribution(contributor: Contributor, sigma: float) -> float | None:
     """The part of a metric's σ that an input causes by itself; None where noise could have done so."""
     sure = surely(contributor.first_interval) and contributor.surely_acts
-    if contributor.input == UNEXPLAINED or contributor.first is None or not sure:
+    if contributor.input == UNEXPLAINED or contributor.bounded_first is None or not sure:
         return None
-    return float(np.sqrt(max(contributor.first, 0.0))) * sigma
+    return float(np.sqrt(max(contributor.bounded_first, 0.0))) * sigma
 
 
 def _sigma_cell(flown: Flown, metric: str, contributor: Contributor) -> Cell:
@@ -131,7 +131,7 @@ def _note(flown: Flown, contributions: Contributions, shown: list[str]) -> str:
     if any(_beyond_total(row) for row in rows):
         each += (
             " Both effects are estimated separately: a first-order effect larger than its total effect, which no true "
-            "one is, is an error of the estimates."
+            "one is, is an error of the estimates; a 1σ contribution is of no more than the upper end of the total one."
         )
     if contributions.trends is None:
         reduction = (

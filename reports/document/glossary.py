@@ -127,9 +127,10 @@ GLOSSARY = Terms(
         ),
         (
             "1σ budget",
-            "1σ contribution: √(first-order effect) × σ of the metric, where the effect is more than noise. The root "
-            "sum square of all contributions is below σ by what interactions and unexplained draws add; where they add "
-            "nothing, the errors of the effects may put it slightly above σ.",
+            "1σ contribution: √(first-order effect) × σ of the metric, where the effect is more than noise, and no "
+            "more than the total effect may be. The root sum square of all contributions is below σ by what "
+            "interactions and unexplained draws add; where they add nothing, the errors of the effects may put it "
+            "slightly above σ.",
         ),
         (
             "circular error probable (CEP)",

@@ -49,9 +49,16 @@ class Contributor:
     fall_interval: Interval | None = None
 
     @property
+    def bounded_first(self) -> float | None:
+        """The first-order effect, but no larger than the total effect may be: what is beyond is an error of it."""
+        if self.first is None or self.total_interval is None:
+            return self.first
+        return min(self.first, self.total_interval[1])
+
+    @property
     def size(self) -> float:
         """What contributors are ranked by: the total effect, or what is known of it."""
-        return max(value for value in (self.total, self.first, 0.0) if value is not None)
+        return max(value for value in (self.total, self.bounded_first, 0.0) if value is not None)
 
     @property
     def surely_acts(self) -> bool:

@@ -33,7 +33,7 @@ def scenario_blocks(flown: Flown) -> Iterator[Table | str | None]:
     if changed is None and flown.manifest.get("parameters"):
         yield "All parameters and settings that are not dispersed have the model’s own values (appendix Inputs)."
     yield changed
-    yield input_table(flown) or "No input is dispersed: all cases are the nominal one."
+    yield input_table(flown) or "No input is dispersed: all cases have the nominal inputs."
 
 
 def _vehicle(flown: Flown) -> str:

@@ -267,6 +267,8 @@ def test_a_campaign_without_requirements_figures_or_dispersions_still_reports():
     run = synthetic_run(50, failed=0, requirements=[], figures=[], inputs=[], published=[], parameters=[], settings=[])
     document = build(run, RUN)
     assert "sets no requirement" in document.subtitle
+    # not that all cases are the nominal one: noise made in flight differs
+    assert "No input is dispersed: all cases have the nominal inputs." in _sentences(document)
     assert "published" not in [section.anchor for section in document.sections]
 
 

@@ -62,6 +62,16 @@ def test_an_effect_that_noise_could_have_made_contributes_nothing_to_sigma():
     assert strongest([sure, replace(unsure, total=0.1, total_interval=(-0.02, 0.22))]) == [sure]
 
 
+def test_an_input_contributes_no_more_than_its_total_effect_may_be_and_is_ranked_by_that():
+    """Of 30 inputs some have a first-order effect by chance: one of 0.001 of the variance got a quarter of σ."""
+    chance = Contributor("miss", "ve", 0.06, 0.001, (0.01, 0.10), (0.0005, 0.0016))
+    weak = Contributor("miss", "oe", 0.03, 0.034, (0.01, 0.07), (0.03, 0.04))
+    assert sigma_contribution(chance, 2.0) == pytest.approx(0.08)
+    assert chance.size < weak.size
+    alone = Contributor("miss", "ve", 0.06, None, (0.01, 0.10), None)
+    assert (alone.size, sigma_contribution(alone, 2.0)) == (0.06, pytest.approx(0.4899, abs=1e-4))
+
+
 # ---- histories
 
 
