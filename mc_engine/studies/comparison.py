@@ -237,10 +237,14 @@ def pair_cases(tables: tuple[pd.DataFrame, pd.DataFrame], inputs: tuple[list[str
         return Pairing(False, everything, f"not paired: {why}")
     n = int(same.sum())
     rest = len(tables[0]) + len(tables[1]) - 2 * n
-    remainder = f"; {rest:,} cases that only one run has, or with other inputs, are left out" if rest else ""
-    return Pairing(
-        True, (first[same], second[same]), f"paired: {n:,} cases have the same inputs in both runs{remainder}"
+    alone = (
+        "1 case that only one run has, or with other inputs, is"
+        if rest == 1
+        else (f"{rest:,} cases that only one run has, or with other inputs, are")
     )
+    remainder = f"; {alone} left out" if rest else ""
+    have = "1 case has" if n == 1 else f"{n:,} cases have"
+    return Pairing(True, (first[same], second[same]), f"paired: {have} the same inputs in both runs{remainder}")
 
 
 def _equal(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from reports.text.numbers import axis_label, count, given_percent, number
 
 MOST_METRICS = 8
 MOST_INPUTS = 12  # of a metric in the table
+ROUNDING = 1e-12  # of the largest index of a metric: a smaller one is the rounding of a zero
 BLOCKS = {"saltelli": "blocks", "morris": "trajectories"}
 _TITLES = {
     "first_order": "First-order index",
@@ -82,7 +83,8 @@ def _index_table(
         unit = flown.unit(name) if designed.design == "morris" else ""
         metric = Cell(axis_label(names[name], unit), small=used)
         for row in np.argsort(-designed.values[main][:, k], kind="stable")[:MOST_INPUTS]:
-            cells = [_cell(designed.values[index][row, k], designed.reach[index][row, k]) for index in indices]
+            least = ROUNDING * float(np.nanmax(designed.values[main][:, k]))
+            cells = [_cell(designed.values[index][row, k], designed.reach[index][row, k], least) for index in indices]
             rows.append((metric, Cell(flown.words(designed.inputs[row])), *cells))
     if designed.design == "saltelli":
         return Table(
@@ -99,9 +101,10 @@ def _index_table(
     )
 
 
-def _cell(value: float, reach: float) -> Cell:
-    text = number(value, 3)
-    return Cell(text, float(value), f"± {number(reach, 2)}" if np.isfinite(reach) else "")
+def _cell(value: float, reach: float, least: float) -> Cell:
+    """An index and half its interval; what is below `least` is the rounding of a zero."""
+    value, reach = (0.0 if abs(index) < least else float(index) for index in (value, reach))
+    return Cell(number(value, 3), value, f"± {number(reach, 2)}" if np.isfinite(reach) else "")
 
 
 def _saltelli_note(indices: DesignedIndices, confidence: str) -> str:

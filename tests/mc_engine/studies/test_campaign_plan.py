@@ -26,6 +26,7 @@ def test_each_requirement_has_the_smallest_samples_for_its_own_share():
     lines = plan(RANGE + FUEL)
     assert numbers(lines, "range:") == ["852", "1440", "1970", "2473", "2959", "3433"]
     assert numbers(lines, "fuel:") == ["59", "93", "124", "153", "181", "208"]
+    assert any(line.startswith("  93 cases allow 1 failure; they pass") for line in plan(FUEL, cases=93))
 
 
 def test_all_together_take_the_most_of_each_and_the_joint_share_less():

@@ -57,6 +57,9 @@ def test_a_longer_run_is_paired_on_the_cases_of_the_shorter(tmp_path):
     assert [rows.size for rows in found.pairing.rows] == [300, 300]
     assert "100 cases that only one run has" in found.pairing.reason
     assert not found.changed
+    few = compared(run(tmp_path / "c", n=1), run(tmp_path / "d", n=2)).pairing.reason
+    assert few.startswith("paired: 1 case has the same inputs in both runs; 1 case that only one run has, or with")
+    assert few.endswith("is left out")
 
 
 def test_pairs_need_half_of_the_smaller_run(tmp_path):
