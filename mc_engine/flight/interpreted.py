@@ -45,6 +45,7 @@ class InterpretedFlight:
         self.metrics: tuple[Any, ...] = ()
         self._end = time.monotonic() + seconds
         self.t = 0.0
+        self._period = 0.0  # of the samples of adaptive steps [s]; on a grid the loops call `control` at samples alone
         self._names: dict[str, dict[str, Any]] = {}
         self._has_powers = has_powers(getattr(model, name) for name in PHYSICS)
         self._unwatched = functions = functions_of(model, self)
@@ -65,6 +66,7 @@ class InterpretedFlight:
         common, must_stop = (model.kernel_parameters, self._settings, 1), "stop" in actions
         if adaptive:
             pair, (clock, atol, *out, history, rows, pace) = rest[:4], rest[4:]
+            self._period = float(clock[2])
             order = (np.zeros(1, dtype=np.int64), *inputs, [Number(value) for value in clock], atol, must_stop)
             fly(self._functions, pair, *common, *order, out, history, rows, pace)
             return
@@ -80,9 +82,23 @@ class InterpretedFlight:
         def called(*arguments: Any) -> Any:
             if name not in ("initial", "start"):
                 self.t = float(arguments[0])
+            if self._is_idle(name, arguments):
+                return arguments[1:3] if name == "switch" else arguments[2]
             return self.call(name, function, arguments)
 
         return called
+
+    def _is_idle(self, name: str, arguments: tuple[Any, ...]) -> bool:
+        """Whether the loops call a function for the sake of other lanes: of a case alone they leave out the result.
+
+        So it is with `switch` where no event acts or one ends the case, and with `control` at an event between samples.
+        """
+        if name == "control":
+            return bool(arguments[0] < arguments[-1].sample * self._period)
+        if name != "switch":
+            return False
+        acting = [event.action for event, hit in zip(self.model.event_list, arguments[-1], strict=True) if hit > 0.5]
+        return "switch" not in acting or "stop" in acting
 
     def call(self, name: str, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         """The result of one function of the model.  name : what the engine calls it, such as "rhs"."""

@@ -24,6 +24,7 @@ from mc_engine.flight.interpreted import InterpretedFlight
 from mc_engine.flight.lost_numbers import origin_of
 from mc_engine.lanes.number import Origin, Place, numbers
 from mc_engine.lanes.physics_function import PhysicsFunction
+from mc_engine.model.phases import due_field
 from mc_engine.model.reading import FOR_DEBUGGING, code_of, definition_of, functions_of_model, source_faults
 from mc_engine.model.record import Model
 from mc_engine.status import STATUS_NAME
@@ -104,7 +105,8 @@ class _StoppingFlight(InterpretedFlight):
             event = next(event for event in model.event_list if event.name == stop.event)
             self._event = model.event_list.index(event)
             self.functions = ("switch",) if event.action == "switch" else ("observe", "evaluate")
-            if not _written(model, self.functions):  # the event begins a phase, and nothing else
+            acts_later = due_field(event.name) in [other.name for other in model.event_list]
+            if acts_later or not _written(model, self.functions):  # or the event begins a phase, and nothing else
                 self.functions = ("rhs",)
         super().__init__(model)
 
@@ -117,6 +119,10 @@ class _StoppingFlight(InterpretedFlight):
                 self._due = stop.time is None or arguments[0] >= stop.time
         # with Numbers at once: what is printed is printed once, and a quotient by zero is infinite as in kernels
         return function(*(numbers(argument) for argument in arguments))
+
+    def unset(self, function: Callable[..., Any], f: Any, *arguments: Any) -> Any:
+        with _silent():
+            return super().unset(function, f, *arguments)
 
     def any_of(self, indices: Any) -> Callable[[Any], Any]:
         def has_fired(masks: Any) -> bool:
@@ -162,17 +168,25 @@ def _flattened(value: Any) -> Iterator[Any]:
 
 def _breaking_call(model: Model, inputs: dict[str, Any], noise: int, seed: int) -> tuple[int, tuple[Place, ...]]:
     """(index of the call that made the number which broke the flight, its places); (-1, ()) where none did."""
-    flight, hook = _NotingFlight(model), sys.breakpointhook
-    try:
-        sys.breakpointhook = lambda *_, **__: None
-        with contextlib.redirect_stdout(io.StringIO()):
-            _, status, _, _ = fly_interpreted(flight, inputs, noise, seed)
-    finally:
-        sys.breakpointhook = hook
+    flight = _NotingFlight(model)
+    with _silent():
+        _, status, _, _ = fly_interpreted(flight, inputs, noise, seed)
     origin, _ = origin_of(flight, int(status[0]))
     if origin is None:
         return -1, ()
     return flight.made.get(id(origin), (origin, flight.calls))[1], origin.places
+
+
+@contextlib.contextmanager
+def _silent() -> Iterator[None]:
+    """Within the block the model's own `print` and `breakpoint()` do nothing."""
+    hook = sys.breakpointhook
+    try:
+        sys.breakpointhook = lambda *_, **__: None
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        sys.breakpointhook = hook
 
 
 def _stopped_at(model: Model, places: Iterable[Place]) -> list[tuple[PhysicsFunction, int]]:
@@ -231,9 +245,9 @@ def _with_stop(function: Any, line: int, is_due: Callable[[str], bool]) -> Any:
     own.decorator_list = []
     body, index = _position(own.body, line) if line else (own.body, 0)
     stop = ast.parse("if __is_due__(): __breakpoint__()").body[0]
-    for node in ast.walk(stop):  # a line of its own, so that the next line is where a debugger shows the frame
+    for node in ast.walk(stop):  # a line of its own, above the function: a debugger shows the frame at the next
         if isinstance(node, ast.stmt | ast.expr):
-            node.lineno = node.end_lineno = own.lineno
+            node.lineno = node.end_lineno = max(own.lineno - 1, 1)
     body.insert(index, stop)
     given = {"__is_due__": partial(is_due, function.__name__), "__breakpoint__": builtins.breakpoint}
     given |= {

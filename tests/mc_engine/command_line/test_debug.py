@@ -95,3 +95,46 @@ def test_it_stops_in_observe_where_an_event_ends_a_case_that_also_notes_it(tmp_p
     assert "did not happen" not in printed + complaint
     assert "stopped in `observe` at t = " in printed
     assert re.search(r"> model\.py\(\d+\)observe\(\)", printed)
+
+
+SAMPLED = (
+    ("clock=FixedStep(step=10.0, until=10_000.0)", "clock=AdaptiveStep(until=10_000.0, control_period=1000.0)"),
+    ("import Event, FixedStep", "import AdaptiveStep, Event"),
+    ("from mc_engine.lanes", "from collections import namedtuple\n\nfrom mc_engine.lanes"),
+    ("@physics\ndef observe", """Memory = namedtuple("Memory", "samples", defaults=(0.0,))
+
+
+@physics
+def control(t, m):
+    print("sample", float(t))
+    return Memory(samples=m.samples + 1.0)
+
+
+@physics
+def across(s): return s.x
+
+
+@physics
+def switch(s, m): print("acts"); return s, m
+
+
+@physics
+def observe"""),
+    ("events={", 'memory=Memory, control=control, switch=switch, '
+     'events={"quarter": Event(across, "falling", "switch", after=50.0), '),
+)  # fmt: skip
+
+
+def test_what_physics_prints_is_of_calls_that_have_an_effect(tmp_path):
+    folder = write_campaign(tmp_path / "sampled", *SAMPLED)
+    status, printed, _ = debug(folder)
+    assert status == 0
+    assert printed.splitlines()[:-1] == ["sample 0.0", "sample 1000.0", "acts", "sample 2000.0"]
+
+
+def test_it_stops_where_a_delayed_event_crosses_and_in_a_function_of_one_line(tmp_path):
+    folder = write_campaign(tmp_path / "sampled", *SAMPLED)
+    _, printed, _ = debug(folder, "--at-event", "quarter", typed="p abs(s.x) < 1.0\nq\n")
+    assert re.search(r"stopped in `rhs` at t = 1\d+\.\d+ s\n> model\.py\(\d+\)rhs\(\)\n.*\n\(Pdb\) True", printed)
+    _, printed, _ = debug(folder, "--at-event", "quarter_due", typed="p s.x < -1e5\nq\n")
+    assert re.search(r"> model\.py\(\d+\)switch\(\)\n-> def switch\(s, m\): .*\n\(Pdb\) True", printed)
