@@ -182,9 +182,16 @@ def _none_completing(campaign: Campaign, flown: Columns) -> Iterator[str]:
     text = {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()}[word]
     reasons = [str(reason) for reason in flown["reason"] if reason]
     sentence = f"none of the first {status.size} cases completes: {counts.max()} are {word}"
-    if word == "no-stop":
+    first = int(np.flatnonzero(status == word)[0])
+    where = [str(flown["reason"][first])]  # with phases, that of the end
+    if word == "refused":
+        text, where = reasons[0] if reasons else text, []
+    elif word == "no-stop":
         text = why_no_stop(campaign)
-    yield f"{sentence} ({reasons[0] if word == 'refused' and reasons else text})"
+    else:
+        where = [f"at t = {flown[END_TIME][first]:.6g} s", *where]
+    ends = " ".join(filter(None, where))
+    yield f"{sentence} ({text}{f'; the first of them ends {ends}' if ends else ''})"
 
 
 def _never_set(campaign: Campaign, flown: Columns) -> Iterator[str]:

@@ -3,6 +3,7 @@
 import ast
 from collections.abc import Iterator, Mapping
 from hashlib import sha256
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from mc_engine.flight.kernel import build_kernel
 from mc_engine.flight.kernel_parts import watching_events
 from mc_engine.flight.repeatability import Columns
 from mc_engine.lanes.kernel_cache import form_of, kept_or_made
-from mc_engine.model.fields import Event
+from mc_engine.model.fields import DIRECTIONS, Event
 from mc_engine.model.phases import due_field, noted_field
 from mc_engine.model.reading import code_of, place_of
 from mc_engine.model.record import Model, compiled_model
@@ -26,6 +27,7 @@ from mc_engine.suggestions import listed
 _INTERPRETED_S = 10.0  # of the nominal case flown by Python: the kernel that it spares takes about as long to compile
 _LOOKED_AT = 5  # flights whose event functions are looked at: the nominal case and some others
 _ZERO = 1e-6  # of an event function's reach: a flight that comes or ends as near has reached the zero
+_DECIDED = "let its function depend on the state and parameters alone, or let `control` decide"
 _OTHER = {"rising": "falling", "falling": "rising"}
 Looks = dict[str, Columns]  # by the case in words, its times and event functions
 
@@ -69,6 +71,8 @@ def why_no_stop(campaign: Campaign) -> str:
     cases = {name: np.array([value]) for name, value in campaign.nominal.items()}
     looks = _looks(campaign, watching_events(model), cases, np.array([NOMINAL_NOISE]))
     for event in usual:
+        if carried := _carried(model, event, looks):
+            return f"no stopping event happens before the time limit: {carried}; {_DECIDED}"
         if other := _other_way(model, event, looks):
             return f"no stopping event happens before the time limit: {other}; {_mended(event)}"
     if not delayed.keys() & {*stops}:
@@ -134,6 +138,8 @@ def _looks(campaign: Campaign, watched: Model, cases: Mapping[str, np.ndarray], 
 
 def _never_happens(model: Model, event: Event, looks: Looks, n_cases: int) -> str:
     """The sentence on an event; "" where a flight without phases comes to its zero, such as one that ends there."""
+    if carried := _carried(model, event, looks):
+        return f"{carried}; {_DECIDED}, or declare it with rare=True if it is for unusual cases"
     if other := _other_way(model, event, looks):
         return (f"{other}, in which it happens in none of {n_cases} cases; {_mended(event)}, or declare it with "
                 "rare=True if it is for unusual cases")  # fmt: skip
@@ -158,6 +164,20 @@ def _other_way(model: Model, event: Event, looks: Looks) -> str:
         if np.isnan(own) and not np.isnan(t):
             return (f'{_place(model, event)}: the event "{event.name}" crosses zero {_OTHER[event.direction]} at '
                     f'{t:.4g} s in {who}, but its direction is "{event.direction}"')  # fmt: skip
+    return ""
+
+
+def _carried(model: Model, event: Event, looks: Looks) -> str:
+    """Where a sample, a switch or the beginning of a phase carries an event's function over zero; "" if nowhere."""
+    signs = (1.0, -1.0) if event.direction == "either" else (DIRECTIONS[event.direction],)
+    for (who, look), sign in product(looks.items(), signs):
+        t, values = look["t_s"], sign * look[event.name]
+        jumps = np.flatnonzero((t[1:] == t[:-1]) & (values[:-1] < 0.0) & (values[1:] >= 0.0))
+        if jumps.size:
+            return (
+                f'{_place(model, event)}: the event "{event.name}" does not happen where a sample of the control, '
+                f"`switch` or the beginning of a phase carries it over zero, at {t[jumps[0]]:.4g} s in {who}"
+            )
     return ""
 
 

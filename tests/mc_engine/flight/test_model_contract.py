@@ -189,6 +189,29 @@ def test_an_event_whose_direction_never_comes_is_named_with_its_line_the_time_an
     assert faults(switching_half_way(tmp_path / "either", direction="either")) == []
 
 
+def test_a_stopping_event_that_a_sample_carries_over_zero_is_named_with_the_time(tmp_path):
+    edits = [
+        ("from mc_engine.lanes import", "from collections import namedtuple\n\nfrom mc_engine.lanes import where,"),
+        in_front('Memory = namedtuple("Memory", "target", defaults=(1e12,))', "climb"),
+        in_front("@physics\ndef control(t):\n    return Memory(target=where(t < 500.0, 1e12, -1e12))", "climb"),
+        ("def climb(s)", "def climb(s, m)"),
+        (CLIMB, "return m.target"),
+        given("memory=Memory", "control=control"),
+        ("10_000.0", "900.0"),
+    ]
+    sentence = only(faults(campaign_with(tmp_path, *edits)))
+    place = f"model.py, line {line_of(tmp_path, 'MODEL = model(') + 2}"
+    assert f'limit: {place}: the event "apogee" does not happen where a sample of the control, `switch`' in sentence
+    assert "carries it over zero, at 500 s in the nominal case; let its function depend on the state" in sentence
+
+
+def test_where_no_case_completes_the_sentence_says_when_the_first_ends(tmp_path):
+    clock = "AdaptiveStep(until=10_000.0, attempts=20)"
+    edits = [("import Event, FixedStep", "import AdaptiveStep, Event"), (CLOCK, clock)]
+    sentence = only(faults(campaign_with(tmp_path, *edits)))
+    assert re.search(r"32 are step-limit \(the cap .* reached; the first of them ends at t = \d+\.?\d* s\)$", sentence)
+
+
 CLIMB = "return s.x * s.vx + s.y * s.vy"
 
 
