@@ -89,6 +89,8 @@ def find_campaign(reference: str | Path) -> Path:
     if os.path.isfile(file):  # not Path.is_file: a name may be too long, or hold a zero byte
         if (place := str(file.resolve())) != readable(place):
             raise CampaignError(readable(text), [Problem("", NO_TEXT)])
+        if file.suffix == ".py":
+            raise CampaignError(text, [Problem("", "is no campaign file; name the .toml file that names this model")])
         return file
     raise CampaignError(without_secrets(text), [Problem("", _not_found(text, path, list(shipped)))])
 

@@ -8,6 +8,7 @@ import inspect
 import linecache
 import math
 import re
+import sys
 import sysconfig
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,7 +20,6 @@ from typing import Any
 
 from mc_engine.errors import EngineError, ModelError
 from mc_engine.lanes.number import Origin
-from mc_engine.lanes.philox import Draws
 from mc_engine.suggestions import hint, nearest
 from mc_engine.units import UNITS, unit_suffix
 
@@ -99,7 +99,7 @@ def fault_of_trial(error: Exception) -> str:
     elif unknown := _UNKNOWN_FIELD.match(text):
         text = f'{unknown[1]}(...) has no field "{unknown[2]}"{_hint_of_field(error, unknown[1], unknown[2])}'
     elif not isinstance(error, EngineError):  # which says the fix itself
-        text = f"{type(error).__name__}: {_ARRAY.sub('a number', text)}{_hint_of_name(error) or f'; {PHYSICS}'}"
+        text = f"{type(error).__name__}: {_ARRAY.sub('a number', text)}{_hint_of_error(error) or f'; {PHYSICS}'}"
     return f"{source_place(frame.f_code.co_filename, line) if frame else 'the model'}: {text}"
 
 
@@ -111,8 +111,17 @@ def _hint_of_field(error: Exception, record: str, field: str) -> str:
     return hint(field, getattr(made, "_fields", ()))
 
 
-def _hint_of_name(error: Exception) -> str:
-    """What to do about a name that is not known, or an unknown field."""
+def _hint_of_error(error: Exception) -> str:
+    """What to do about a name that has no value, an unknown field, and numbers that cannot be combined."""
+    text = str(error)
+    if re.search(r"\bDraws\b", text):
+        return "; for noise hand it to normal_pair(draws, index) of mc_engine.lanes.noise"
+    if isinstance(error, UnboundLocalError):
+        return "; give it a value on a line above, whichever way an `if` goes"
+    if "'bitwise_" in text or "for &" in text or "for |" in text:
+        return "; & and | join conditions, each in parentheses: (a > b) & (c > d)"
+    if "could not be broadcast" in text:
+        return "; a tuple is no number: give its parts names, as in n1, n2 = normal_pair(draws, 0)"
     if not isinstance(error, NameError):
         return _hint_of_attribute(error)
     from mc_engine import lanes  # which loads the compiler
@@ -120,13 +129,17 @@ def _hint_of_name(error: Exception) -> str:
     frame, _ = frame_in_model(error)
     if error.name in _HANDED and frame:
         return f"; a function takes what it names: write `{error.name}` among the arguments of `{frame.f_code.co_name}`"
-    return "; import it from mc_engine.lanes" if error.name in lanes.__all__ else ""
+    if error.name in lanes.__all__:
+        return "; import it from mc_engine.lanes"
+    own, outside = (frame.f_locals, frame.f_globals) if frame else ({}, {})
+    holder = next((name for name, value in own.items() if error.name in getattr(value, "_fields", ())), "")
+    near = nearest(str(error.name), [*own, *outside])
+    meant = f'did you mean "{near}"?' if near else "give it a value on a line above, or import it"
+    return f"; write `{holder}.{error.name}`" if holder else f"; {meant}"
 
 
 def _hint_of_attribute(error: Exception) -> str:
     """What an unknown field of a record was meant to be: that of a column, which physics has without its unit."""
-    if isinstance(error, AttributeError) and isinstance(error.obj, Draws):
-        return "; for noise hand it to normal_pair(draws, index) of mc_engine.lanes.noise"
     if not isinstance(error, AttributeError) or not hasattr(error.obj, "_fields"):
         return ""
     name, known = str(error.name), error.obj._fields
@@ -196,18 +209,23 @@ def wrong_record(error: BaseException) -> str:
 
 
 def _arguments(made: Any) -> list[str]:
-    """What a record of the engine's, or `model`, is made with; [] for anything else."""
+    """What a record or a function of the engine's takes, such as `model` or `curve`; [] for anything else."""
     if isinstance(made, type) and is_dataclass(made):
         return [item.name for item in fields(made)]
-    engine = isinstance(made, FunctionType) and made.__module__.startswith("mc_engine.model")
+    engine = isinstance(made, FunctionType) and made.__module__.startswith("mc_engine.")
     return list(inspect.signature(made).parameters) if engine else []
 
 
-def relative_import(error: BaseException) -> str:
-    """What is wrong with an import that begins with a dot, in a model that is a file; "" for other errors."""
-    if not isinstance(error, ImportError) or "relative import with no known parent" not in str(error):
+def wrong_import(error: BaseException) -> str:
+    """What is wrong with an import from a dot in a model's file, or of a name that a module has not; "" for others."""
+    if not isinstance(error, ImportError):
         return ""
-    return "an import from a dot, which a model's file cannot have; leave the dot out, as in from guidance import ..."
+    if "relative import with no known parent" in str(error):
+        return "an import from a dot, which a model's file cannot have; leave it out, as in from guidance import ..."
+    missing, module = re.match(r"cannot import name '(\w+)'", str(error)), sys.modules.get(error.name or "")
+    if missing is None or module is None:
+        return ""
+    return f'{error.name} has no "{missing[1]}"{hint(missing[1], getattr(module, "__all__", [*vars(module)]))}'
 
 
 def _place_and_cause(error: Exception) -> tuple[str, str]:

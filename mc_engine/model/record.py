@@ -23,7 +23,7 @@ import numpy as np
 from mc_engine.errors import ModelError
 from mc_engine.lanes.composed import blocks_in
 from mc_engine.lanes.physics_function import PhysicsFunction
-from mc_engine.model.faults import place_in_model, relative_import, wrong_record
+from mc_engine.model.faults import place_in_model, wrong_import, wrong_record
 from mc_engine.model.fields import (
     AdaptiveStep,
     Event,
@@ -263,7 +263,7 @@ def _fault(reference: str, error: BaseException) -> str:
     """The error of a model's own code in a sentence with its place."""
     place = place_in_model(error) or f'"{reference}"'
     if isinstance(error, SyntaxError):
-        place = f"{Path(error.filename or reference).name}, line {error.lineno}"
+        place = f"{Path(error.filename or reference).name}, line {error.lineno or 1}"
     if isinstance(error, SystemExit):
         return f"{place}: ends the program; a model only defines MODEL"
     if isinstance(error, ModelError):
@@ -271,7 +271,8 @@ def _fault(reference: str, error: BaseException) -> str:
     if isinstance(error, FileNotFoundError):
         name = Path(error.filename or str(error).removesuffix(" not found.")).name
         return f'{place}: there is no file "{name}"; a model\'s data lie next to it, named in data=("{name}",)'
-    if words := wrong_record(error) or relative_import(error):
+    if words := wrong_record(error) or wrong_import(error):
         return f"{place}: {words}"
     text = error.msg if isinstance(error, SyntaxError) else str(error)
+    text += "; save the file as UTF-8" if "encoding" in text or "codec can't decode" in text else ""
     return f"{place}: {type(error).__name__}: {text}"

@@ -9,6 +9,7 @@ import sys
 from collections import namedtuple
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -19,7 +20,7 @@ from mc_engine.errors import ModelError
 from mc_engine.lanes.composed import Alternatives, value_of
 from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.number import calling
-from mc_engine.lanes.philox import Draws, noise_key
+from mc_engine.lanes.philox import noise_key
 from mc_engine.model.faults import MORE, fault_of_trial, origin_sentence, source_place
 from mc_engine.model.phases import PHASE
 from mc_engine.model.reading import is_shipped, place_of, source_faults
@@ -44,6 +45,16 @@ _passed: set[Model] = set()
 
 class Breach(ModelError):
     """One breach of the contract; its text is the sentence."""
+
+
+@dataclass(frozen=True)
+class Draws:
+    """The draws of a sample, as `mc_engine.lanes.philox` has them, but no tuple: none of them is a random number."""
+
+    key: int
+    case: float
+    sample: float
+    __array_ufunc__ = None
 
 
 class _ByZero(Exception):

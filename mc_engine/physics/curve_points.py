@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mc_engine.errors import ModelError
-from mc_engine.suggestions import hint, listed
+from mc_engine.suggestions import hint
 from mc_engine.units import UNITS, unit_hint, unit_of, units_meant
 
 LARGEST = 1e300  # of the arguments
@@ -26,7 +26,7 @@ def columns_of(path: Path, wanted: Mapping[str, str | None]) -> dict[str, np.nda
     columns = _parquet(path) if path.suffix == ".parquet" else _csv(path)
     for name in wanted:
         if name not in columns:
-            raise ModelError(f'{path.name} has no column "{name}"{hint(name, columns)}; it has {listed([*columns])}')
+            raise ModelError(f'{path.name} has no column "{name}"{hint(name, columns)}')
     try:
         return {name: columns[name] * si_factor(name, unit) for name, unit in wanted.items()}
     except ModelError as error:
@@ -65,7 +65,8 @@ def _csv(path: Path) -> dict[str, np.ndarray]:
     for number, line in lines[1:]:
         cells = line.split(",")
         if len(cells) != len(names):
-            raise ModelError(f"{path.name}, line {number}: {len(cells)} numbers for {len(names)} columns")
+            numbers = "1 number" if len(cells) == 1 else f"{len(cells)} numbers"
+            raise ModelError(f"{path.name}, line {number}: {numbers} for {len(names)} columns")
         try:
             rows.append([float(cell) for cell in cells])
         except ValueError:

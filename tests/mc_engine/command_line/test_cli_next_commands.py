@@ -41,6 +41,7 @@ def test_a_slip_is_answered_with_what_is_there_or_the_next_command(here):
         (["status", "cart"], "cart: is no run directory; `mc-engine run` makes one"),
         (["run", "runs"], "holds no campaign.toml; `mc-engine init DIR` makes a campaign in a new folder"),
         (["run", "other"], "holds no campaign.toml, but other/case.toml"),
+        (["check", "cart/model.py"], "is no campaign file; name the .toml file that names this model"),
         (["run", "nowhere.toml"], "there is no such file; `mc-engine list` names the shipped campaigns"),
         (["tune", "cart"], "write [tuning.parameter.NAME] and [tuning.objective.NAME], as flexible_satellite/stage_1"),
         (["rare", "cart"], 'there are several; choose one of "reach", "stop", on the command line by `--requirement`'),

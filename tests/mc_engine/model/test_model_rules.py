@@ -66,6 +66,10 @@ def test_a_name_that_physics_does_not_know_gets_its_fix(tmp_path):
     memory = in_front("from collections import namedtuple\n\nMemory = namedtuple('Memory', 'a', defaults=(0.0,))")
     for number, (arguments, result, sentence) in enumerate([
         ("draws", "draws.normal()", "for noise hand it to normal_pair(draws, index) of mc_engine.lanes.noise"),
+        ("draws", "draws[0]", "subscriptable; for noise hand it to normal_pair(draws, index) of mc_engine.lanes.noise"),
+        ("draws", "3.0 * draws", "'Draws'; for noise hand it to normal_pair(draws, index) of mc_engine.lanes.noise"),
+        ("s", "vx", "name 'vx' is not defined; write `s.vx`"),
+        ("s", "s.x > 1.0 & s.x < 2.0", "each in parentheses: (a > b) & (c > d)"),
         ("s", "draws.key", "a function takes what it names: write `draws` among the arguments of `control`"),
         ("s", "exp(s.x)", "name 'exp' is not defined; import it from mc_engine.lanes"),
     ]):  # fmt: skip
@@ -73,6 +77,18 @@ def test_a_name_that_physics_does_not_know_gets_its_fix(tmp_path):
         edits = [control, memory, given("memory=Memory", "control=control")]
         (found,) = breaches(campaign_with(tmp_path / str(number), *edits))
         assert found.endswith(sentence)
+
+
+def test_a_discrete_state_that_is_made_anew_in_part_would_lose_the_rest(tmp_path):
+    memory = in_front("from collections import namedtuple\n\nMemory = namedtuple('Memory', 'a b', defaults=(0.0, 0.0))")
+    for number, (result, lost) in enumerate([("Memory(b=1.0)", "a"), ("Memory(a=s.x)", ""), ("Memory(0.0, s.x)", "")]):
+        control = in_front(f"@physics\ndef control(s, m):\n    return {result}")
+        switch = in_front("@physics\ndef switch(s, m):\n    kept = Memory(a=s.x, b=m.b)\n    return s, kept")
+        functions = (control, *([switch] if lost else []), memory)
+        handed = given("memory=Memory", "control=control", *(["switch=switch"] if lost else []))
+        found = breaches(campaign_with(tmp_path / str(number), *functions, handed))
+        sentence = f'Memory(...) leaves out "{lost}", which would begin anew; write Memory(..., {lost}=m.{lost})'
+        assert [sentence in words for words in found] == [True] * bool(lost)
 
 
 VY, ALTITUDE = 'vy_m_s="vy", class_m="more"', 'altitude_km="altitude", lambda_m="more"'
@@ -88,6 +104,9 @@ LINES = [
     ("@physics\ndef initial", "physics(3)\ndef initial", "physics(3)", "physics marks a function, not 3"),
     ('vy_m_s="vy"', VY, VY, "State: Type names and field names cannot be a keyword: 'class'"),
     ('altitude_km="altitude"', ALTITUDE, ALTITUDE, "field names cannot be a keyword: 'lambda'"),
+    (IMPORTS, "from mc_engine.lanes import arctan,", "import arctan", 'lanes has no "arctan"; did you mean "atan"?'),
+    (IMPORTS, f"from mc_engine.physics.curves import curve\nTHRUST = curve(between='linear')\n{IMPORTS}", "between",
+     "curve: got an unexpected keyword argument 'between'; it takes file, x, y, kind, outside, x_unit, y_unit"),
     (IMPORTS, f"from .guidance import k\n{IMPORTS}", "from .guidance", ": an import from a dot"),
 ]  # fmt: skip
 

@@ -202,7 +202,7 @@ def test_the_rows_of_a_surface_come_in_any_order(folder):
 def test_what_is_wrong_with_a_file_is_said(folder):
     for text, message in [
         ("", "empty"),
-        ("x,y\n1\n", "line 2: 1 numbers for 2 columns"),
+        ("x,y\n1\n", "line 2: 1 number for 2 columns"),
         ("x;y\n1;2\n", 'line 2: "1;2" are not all numbers; write one for each column, with commas between'),
         ("x,y\n1,2\n2,b\n", 'line 3: "2,b"'),
         ("x,z\n1,2\n", 'no column "y"'),
