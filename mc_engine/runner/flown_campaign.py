@@ -25,8 +25,8 @@ def campaign_of(store: "Store", directory: Path | None = None) -> Campaign:
     """The campaign of a run, with its present number of cases.
 
     directory : folder of the campaign's files, by default the run directory with its copies.
-    UsageError if its results were imported or flown by other sources of engine or model; StoreError if the campaign has
-    changed since the run began.
+    UsageError if its results were imported; StoreError if the model, the campaign or the engine's sources have changed
+    since the run began.
     """
     from mc_engine.campaign.sensitivity_design import companion
     from mc_engine.campaign.upstream import COMPANION
@@ -61,7 +61,7 @@ def campaign_of(store: "Store", directory: Path | None = None) -> Campaign:
         raise StoreError(f"{store.path}: a file of the campaign was edited; run the campaign anew")
     ours = flyer_of(campaign).digest(), sampling_digest(), SEED_CONTRACT
     if ours != flown_by or (*CASE_COLUMNS, *columns_of(campaign)) != store.columns:
-        raise UsageError(f"{store.path}: was flown by other sources of engine or model; run the campaign anew")
+        raise StoreError(f"{store.path}: was flown by other sources of engine or model; run the campaign anew")
     return campaign
 
 

@@ -9,7 +9,7 @@ from distributed import Client, LocalCluster
 from trapped import campaign_folder, files_of, trapped
 
 from mc_engine import load_campaign
-from mc_engine.errors import CampaignError, EngineError, RunInterrupted, StoreError, UsageError
+from mc_engine.errors import CampaignError, EngineError, RunInterrupted, StoreError
 from mc_engine.flight.chunks import Task
 from mc_engine.runner import cluster_pool, runner
 from mc_engine.runner.backends import Backend
@@ -183,6 +183,6 @@ def test_a_worker_of_other_sources_is_refused(campaign, whole):
     setup = WorkerSetup(str(whole.path), str(campaign.directory), CASES)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mc_engine.runner.manifest.sampling_digest", lambda: "another")
-        with pytest.raises(UsageError, match="was flown by other sources"):  # nothing is damaged
+        with pytest.raises(StoreError, match="was flown by other sources"):
             run_in_worker(setup, Task(0, 10))
     assert run_in_worker(setup, Task(0, 10)).part.rows == 10
