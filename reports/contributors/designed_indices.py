@@ -110,7 +110,8 @@ def _cell(value: float, reach: float, least: float) -> Cell:
 def _saltelli_note(indices: DesignedIndices, confidence: str) -> str:
     return (
         f"± half the {confidence} interval (bootstrap over blocks; analysis by SALib). First-order index: "
-        "fraction of the variance due to this input alone; total index: fraction due to it and its interactions. A "
+        "fraction of the variance due to this input alone; total index: fraction due to it and its interactions; below "
+        "0 or above 1 it is an error of the estimate, as of metrics with long tails and too few blocks. A "
         f"block is {len(indices.inputs) + 2} cases; one with a case that has no number is left out whole. Random draws "
         "in flight count into every total index."
     )

@@ -33,6 +33,7 @@ def test_indices_stand_in_a_table_that_counts_whole_blocks(design, size, word):
     assert propellant[0][2].value > propellant[1][2].value > 0.0
     assert propellant[0][2].small.startswith("± ")
     assert sum(isinstance(block, FigureBlock) for block in blocks) == (design == "saltelli")
+    assert ("below 0 or above 1 it is an error of the estimate" in table.note) == (design == "saltelli")
 
 
 def test_too_few_blocks_are_a_sentence():
