@@ -198,10 +198,10 @@ class ProgramFlight:
 
 
 def numeric(given: Any) -> Any:
-    """What was given; TypeError for text and truth values, which Python and NumPy would take as numbers."""
+    """What was given; TypeError for text, truth values, dates and complex, which NumPy would take as numbers."""
     kind = getattr(getattr(given, "dtype", None), "kind", "")
     items = np.ravel(given) if kind == "O" else given if isinstance(given, list | tuple) else [given]
-    if kind in ("b", "S", "U") or (kind in ("", "O") and any(isinstance(item, str | bytes | bool) for item in items)):
+    if kind in tuple("bSUmMc") or (kind in ("", "O") and any(isinstance(item, str | bytes | bool) for item in items)):
         raise TypeError
     return given
 
@@ -209,6 +209,11 @@ def numeric(given: Any) -> Any:
 def in_time(history: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The history as it is; ValueError with a sentence unless its times are numbers that never fall."""
     times = history["t_s"]
+    if shaped := [name for name, column in history.items() if column.ndim != 1]:
+        shape = history[shaped[0]].shape
+        raise ValueError(
+            f'the column "{shaped[0]}" of the history has the shape {shape}; it must have one number a row'
+        )
     if not np.isfinite(times).all():
         raise ValueError("a time of the history is not a number")
     if (falls := np.flatnonzero(np.diff(times) < 0.0)).size:

@@ -34,6 +34,11 @@ PYTHON_FAULTS = {
         "no-result",
         "is array(True), which is no number",
     ),
+    "complex": (
+        "return {'fall_time_s': 1.0, 'impact_speed_m_s': np.sqrt(-1.0 + 0j)}",
+        "no-result",
+        "which is no number",
+    ),
     "refused": ("raise Refuse('too heavy')", "refused", "too heavy"),
     "loud": ("print('x' * 5_000_000)\n    raise ValueError('loud')", "crashed", "ValueError: loud"),
 }
@@ -262,6 +267,9 @@ HISTORIES = {
     "word": ("pd.DataFrame({'t_s': [0.0], 'speed_m_s': ['fast']})", 'column "speed_m_s" of the history is no numbers'),
     "text": ("{'t_s': [0.0], 'speed_m_s': ['1.0']}", 'column "speed_m_s" of the history is no numbers'),
     "truth": ("pd.DataFrame({'t_s': [0.0], 'speed_m_s': [True]})", 'column "speed_m_s" of the history is no numbers'),
+    "shape": ("{'t_s': [[0.0]], 'speed_m_s': [[1.0]]}", 'column "t_s" of the history has the shape (1, 1)'),
+    "dates": ("{'t_s': np.array([1], 'm8[s]'), 'speed_m_s': [1.0]}", 'column "t_s" of the history is no numbers'),
+    "complex": ("{'t_s': [0.0], 'speed_m_s': np.ones(1) * 1j}", 'column "speed_m_s" of the history is no numbers'),
     "lengths": ("{'t_s': [0.0, 1.0], 'speed_m_s': [1.0]}", "columns of the history have 2 and 1 rows"),
     "number": ("3.0", "the history is a float; it must be a DataFrame"),
 }
