@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from traceback import walk_tb
-from types import FrameType, FunctionType
+from types import FrameType, FunctionType, SimpleNamespace
 from typing import Any
 
 from mc_engine.errors import EngineError, ModelError
@@ -140,6 +140,8 @@ def _hint_of_error(error: Exception) -> str:
 
 def _hint_of_attribute(error: Exception) -> str:
     """What an unknown field of a record was meant to be: that of a column, which physics has without its unit."""
+    if isinstance(error, AttributeError) and isinstance(error.obj, SimpleNamespace):  # such as CHOICES
+        return hint(str(error.name), vars(error.obj))
     if not isinstance(error, AttributeError) or not hasattr(error.obj, "_fields"):
         return ""
     name, known = str(error.name), error.obj._fields

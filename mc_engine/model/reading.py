@@ -21,7 +21,7 @@ from mc_engine.lanes.composed import Alternatives, ComposedFunction
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model.faults import PHYSICS, source_place
 from mc_engine.model.record import Model
-from mc_engine.model.syntax_tree import tree_of_file
+from mc_engine.model.syntax_tree import repeated, tree_of_file
 from mc_engine.suggestions import listed
 
 # The arguments that the engine hands to each function of a model.
@@ -100,7 +100,7 @@ def source_faults(model: Model) -> list[str]:
         if name not in INTERPRETED and isinstance(function, PhysicsFunction):
             reader.read(function, name, ())
     reader.read_losses()
-    return [*_wrong_functions(model), *reader.breaches]
+    return [*_wrong_functions(model), *reader.breaches, *_repeated(model)]
 
 
 def is_shipped(model: Model) -> bool:
@@ -155,6 +155,20 @@ def _wrong_functions(model: Model) -> Iterator[str]:
         except TypeError:
             given = ", ".join(inspect.signature(function).parameters) or "nothing"
             yield f"{place_of(function)}: `{called}` takes ({given}); the engine gives it ({wanted})"
+
+
+def _repeated(model: Model) -> Iterator[str]:
+    """On keys and functions of the model's files of which Python keeps the last alone."""
+    codes = [code_of(function) for _, function in functions_of_model(model)]
+    files = [code.co_filename for code in codes if code and _ENGINE not in Path(code.co_filename).parents]
+    for file in dict.fromkeys([*files, getattr(getattr(model.sources, "module", None), "__file__", None) or ""]):
+        try:
+            twice = [*repeated(tree_of_file(file))]
+        except (SyntaxError, ValueError):  # no source of a file
+            continue
+        for line, what, before in twice:
+            words = f"{what} is in line {before}, too, and Python keeps the last alone; give each a name of its own"
+            yield f"{source_place(file, line)}: {words}"
 
 
 class _Reader:

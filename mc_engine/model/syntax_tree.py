@@ -54,6 +54,29 @@ def curve_files(source: bytes) -> frozenset[str]:
     return _texts([*_arguments(calls, "file"), *(call.args[0] for call in calls if call.args)])
 
 
+def repeated(tree: ast.Module) -> Iterator[tuple[int, str, int]]:
+    """(line, key of a dictionary or function of the module, line before) of what a source says twice.
+
+    Python keeps the last alone.  A function that is used before it is defined again is none.
+    """
+    for node in ast.walk(tree):
+        met: dict[object, int] = {}
+        for key in node.keys if isinstance(node, ast.Dict) else ():
+            if isinstance(key, ast.Constant):
+                if key.value in met:
+                    yield key.lineno, f"the key {key.value!r} of a dictionary", met[key.value]
+                met[key.value] = key.lineno
+    defined: dict[str, int] = {}
+    for statement in tree.body:
+        if not isinstance(statement, ast.FunctionDef):
+            for node in ast.walk(statement):
+                defined.pop(getattr(node, "id", ""), 0)
+            continue
+        if statement.name in defined:
+            yield statement.lineno, f"the function `{statement.name}`", defined[statement.name]
+        defined[statement.name] = statement.lineno
+
+
 def _arguments(calls: list[ast.Call], name: str) -> list[ast.expr]:
     return [keyword.value for call in calls for keyword in call.keywords if keyword.arg == name]
 

@@ -91,6 +91,17 @@ def test_a_discrete_state_that_is_made_anew_in_part_would_lose_the_rest(tmp_path
         assert [sentence in words for words in found] == [True] * bool(lost)
 
 
+def test_a_key_or_a_function_of_which_python_keeps_the_last_alone_is_named(tmp_path):
+    event = '"apogee": Event(climb, "falling", "stop")'
+    (found,) = breaches(campaign_with(tmp_path / "key", (event, f"{event}, {event}")))
+    assert "the key 'apogee' of a dictionary is in line" in found
+    climb = "@physics\ndef climb(s):\n    return s.x"
+    (found,) = breaches(campaign_with(tmp_path / "twice", in_front(climb)))
+    assert "the function `climb` is in line" in found
+    used = in_front(f"OTHER = Event(climb)\n\n\n{climb}")
+    assert breaches(campaign_with(tmp_path / "used", used)) == []
+
+
 VY, ALTITUDE = 'vy_m_s="vy", class_m="more"', 'altitude_km="altitude", lambda_m="more"'
 # text of the smallest model, what stands in its place, on which line, the sentence
 LINES = [
