@@ -9,7 +9,7 @@ import builtins
 import inspect
 import random
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from enum import Enum
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
@@ -22,7 +22,6 @@ from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model.faults import PHYSICS, source_place
 from mc_engine.model.record import Model
 from mc_engine.model.syntax_tree import repeated, tree_of_file
-from mc_engine.suggestions import listed
 
 # The arguments that the engine hands to each function of a model.
 ARGUMENTS = {
@@ -38,7 +37,6 @@ ARGUMENTS = {
     "prepare": "inputs, settings, refusals",
     "tables": "o",
 }
-_KEEPING = ("start", "control", "switch")  # what makes the discrete state
 INTERPRETED = ("prepare", "tables")  # NumPy, a whole chunk at a time
 
 # The syntax of physics.
@@ -99,7 +97,6 @@ def source_faults(model: Model) -> list[str]:
     for name, function in functions_of_model(model):
         if name not in INTERPRETED and isinstance(function, PhysicsFunction):
             reader.read(function, name, ())
-    reader.read_losses()
     return [*_wrong_functions(model), *reader.breaches, *_repeated(model)]
 
 
@@ -179,8 +176,6 @@ class _Reader:
         self._settings = settings
         self._read: set[PhysicsFunction] = set()
         self._named: set[tuple[CodeType, int | str]] = set()
-        # calls that make a discrete state: where, its class, the fields that are given, whether in flight
-        self._made: list[tuple[CodeType, int, Any, set[str], bool]] = []
 
     def read(self, physics: PhysicsFunction, name: str, callers: tuple[PhysicsFunction, ...]) -> None:
         """Breaches of a function and of the physics that it calls.  callers : the functions that it is called from.
@@ -199,26 +194,12 @@ class _Reader:
             return
         nodes = [(tree, code.co_firstlineno), *_running(tree, code.co_firstlineno)]
         scope = _Scope(inspect.unwrap(physics.function), [node for node, _ in nodes[1:]], self._settings)
-        kept = _classes_returned(nodes, scope) if name in _KEEPING and not callers else ()
         for node, line in nodes:
             if words := _breach(node, scope):
                 self._add(code, line, words)
-            made, given = _fields_given(node, scope, kept)
-            if made is not None:
-                self._made.append((code, line, made, given, name != "start"))
             called = scope.value(node)
             if isinstance(called, PhysicsFunction):
                 self.read(called, called.function.__name__, (*callers, physics))
-
-    def read_losses(self) -> None:
-        """Breaches of calls that make the discrete state anew and leave out fields which others give a value."""
-        for code, line, made, given, in_flight in self._made:
-            set_somewhere = {field for *_, other, fields, _ in self._made if other is made for field in fields}
-            lost = [field for field in made._fields if in_flight and field in set_somewhere - given]
-            if lost:
-                whole = f"{made.__name__}(..., {', '.join(f'{field}=m.{field}' for field in lost)})"
-                words = f"{made.__name__}(...) leaves out {listed(lost)}, which would begin anew; write {whole}"
-                self._add(code, line, words)
 
     def _add(self, code: CodeType, line: int, words: str) -> None:
         """One sentence a line, and one for a mistake that is made on several."""
@@ -304,28 +285,6 @@ def _breach(node: ast.AST, scope: _Scope) -> str:
     if isinstance(node, ast.Compare):
         return _wrong_comparison(node, scope)
     return _wrong_call(node, scope) if isinstance(node, ast.Call) else _wrong_value(scope.value(node))
-
-
-def _classes_returned(nodes: list[tuple[ast.AST, int]], scope: _Scope) -> list[Any]:
-    """The named tuples that a function of the model makes for the last thing that it returns."""
-    returned = [node.value for node, _ in nodes if isinstance(node, ast.Return)]
-    last = [value.elts[-1] if isinstance(value, ast.Tuple) and value.elts else value for value in returned]
-    names = {value.id for value in last if isinstance(value, ast.Name)}
-    for node, _ in nodes:
-        if isinstance(node, ast.Assign) and {ast.unparse(target) for target in node.targets} & names:
-            last.append(node.value)
-    called = [scope.value(value.func) for value in last if isinstance(value, ast.Call)]
-    return [made for made in called if hasattr(made, "_fields")]
-
-
-def _fields_given(node: ast.AST, scope: _Scope, kept: Sequence[Any]) -> tuple[Any, set[str]]:
-    """(class, fields that are given) of a call that makes a discrete state; (None, none) of anything else."""
-    if not isinstance(node, ast.Call) or not (node.args or node.keywords) or scope.value(node.func) not in kept:
-        return None, set()
-    made, named = scope.value(node.func), [keyword.arg for keyword in node.keywords]
-    if None in named or any(isinstance(value, ast.Starred) for value in node.args):
-        return made, {*made._fields}
-    return made, {*made._fields[: len(node.args)], *map(str, named)}
 
 
 def _steps(loop: ast.While) -> bool:

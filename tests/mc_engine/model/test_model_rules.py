@@ -79,18 +79,6 @@ def test_a_name_that_physics_does_not_know_gets_its_fix(tmp_path):
         assert found.endswith(sentence)
 
 
-def test_a_discrete_state_that_is_made_anew_in_part_would_lose_the_rest(tmp_path):
-    memory = in_front("from collections import namedtuple\n\nMemory = namedtuple('Memory', 'a b', defaults=(0.0, 0.0))")
-    for number, (result, lost) in enumerate([("Memory(b=1.0)", "a"), ("Memory(a=s.x)", ""), ("Memory(0.0, s.x)", "")]):
-        control = in_front(f"@physics\ndef control(s, m):\n    return {result}")
-        switch = in_front("@physics\ndef switch(s, m):\n    kept = Memory(a=s.x, b=m.b)\n    return s, kept")
-        functions = (control, *([switch] if lost else []), memory)
-        handed = given("memory=Memory", "control=control", *(["switch=switch"] if lost else []))
-        found = breaches(campaign_with(tmp_path / str(number), *functions, handed))
-        sentence = f'Memory(...) leaves out "{lost}", which would begin anew; write Memory(..., {lost}=m.{lost})'
-        assert [sentence in words for words in found] == [True] * bool(lost)
-
-
 def test_a_key_or_a_function_of_which_python_keeps_the_last_alone_is_named(tmp_path):
     event = '"apogee": Event(climb, "falling", "stop")'
     (found,) = breaches(campaign_with(tmp_path / "key", (event, f"{event}, {event}")))
