@@ -15,6 +15,7 @@ from math import pi
 
 import numpy as np
 
+from mc_engine.errors import ModelError
 from mc_engine.lanes import cos, physics, sin, sqrt
 from mc_engine.physics.constants import EARTH_RATE, MU_EARTH
 from mc_engine.physics.curves import Curve, curve
@@ -224,10 +225,16 @@ def solid_propellant(
 
     thrust : of the time [N];  burn : time at which nothing is left [s];  number, density [kg/m^3] of the cylinders
     outer, inner, length, gap : radii and length of a cylinder at first, and what is between two of them [m]
+    ModelError unless 0 <= inner < outer, and number, density, length and burn are above zero.
 
     The flow goes by the thrust, at a constant exhaust speed; the motor is computed every millisecond.  Derived here
     from m = n rho pi (R^2 - r^2) L with L' = -2 r'.
     """
+    if not (0.0 <= inner < outer and all(size > 0.0 for size in (number, density, length, burn))):
+        raise ModelError(
+            f"solid_propellant: inner {inner:g} m, outer {outer:g} m, length {length:g} m, number {number:g}, density "
+            f"{density:g} kg/m^3, burn {burn:g} s are no motor; give 0 <= inner < outer, and the others above zero"
+        )
     solid, spacing = number * density * pi, length + gap
     t = np.linspace(0.0, burn, round(1e3 * burn) + 1)
     force, radii = thrust(t), np.linspace(inner, outer, 100_001)

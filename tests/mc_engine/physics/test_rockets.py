@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mc_engine.errors import ModelError
 from mc_engine.physics.aerodynamics import fins_lift_area, lift_of_part, parachute_acceleration
 from mc_engine.physics.curves import curve
 from mc_engine.physics.gravity import normal_gravity
@@ -104,6 +105,12 @@ def test_the_rates_of_the_propellant_are_its_derivatives(t):
         slope = (getattr(after, name) - getattr(before, name)) / 2e-2
         assert getattr(now, rate) == pytest.approx(slope, rel=1e-3)
     assert now.change == pytest.approx((after.rate - before.rate) / 2e-2, rel=1e-6)
+
+
+@pytest.mark.parametrize("wrong", [{"outer": 0.01}, {"inner": -0.01}, {"number": 0}, {"length": np.nan}, {"burn": 0.0}])
+def test_sizes_that_are_no_motor_are_named(wrong):
+    with pytest.raises(ModelError, match="0 <= inner < outer"):
+        solid_propellant(THRUST, **{"burn": 4.0} | MOTOR | wrong)
 
 
 def test_behind_the_end_of_burning_nothing_pushes():
