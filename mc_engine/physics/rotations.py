@@ -195,6 +195,7 @@ def euler_sequence(axes):
 
     E. Bernardes and S. Viollet, PLoS ONE 17(11), e0276302 (2022): one formula for all sequences.
     """
+    axes = str(axes)
     if len(axes) != 3 or not set(axes) <= set("123") or axes[0] == axes[1] or axes[1] == axes[2]:
         raise ModelError(f'"{axes}" is no Euler sequence; write three digits of 1, 2, 3, such as "321" or "313"')
     first, second, third = (int(axis) for axis in axes)

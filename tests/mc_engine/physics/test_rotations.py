@@ -119,7 +119,7 @@ def test_euler_angles_at_the_ends_of_the_second_give_the_attitude_back(sequence)
     assert np.abs(np.abs((there * again).sum(axis=0)) - 1.0).max() < 1e-14
 
 
-@pytest.mark.parametrize("axes", ["", "32", "322", "124", "3211", "zyx"])
+@pytest.mark.parametrize("axes", ["", "32", "322", "124", "3211", "zyx", 322, None])
 def test_what_is_no_sequence_is_refused_with_one(axes):
     with pytest.raises(ModelError, match="three digits"):
         rotations.euler_sequence(axes)
