@@ -47,10 +47,11 @@ _BASE, _A, _C = _aloft_constants()
 def us76_air(h):
     """Air of the U.S. Standard Atmosphere, 1976, at geometric altitude h [m].
 
-    To 86 km p = rho R T and a^2 = 1.4 R T, the lowest layer going on below the ground.  Above,
-    the densities and pressures of table I, their logarithms linear in between and going on in line beyond 200 km, where
-    the density is far too thin (see `us76_logarithm`); temperature and speed of sound are then those of 86 km: the
-    standard defines no speed of sound there.
+    To 86 km p = rho R T and a^2 = 1.4 R T, the lowest layer going on below the ground; T is the molecular-scale
+    temperature, which leaves the kinetic one above 80 km and is 0.04 % higher at 86 km.  Above, the densities
+    and pressures of table I, their logarithms linear in between and going on in line beyond 200 km, where the density
+    is far too thin (see `us76_logarithm`); temperature and speed of sound are then those of 86 km: the standard defines
+    no speed of sound there.
     """
     logarithm, _, temperature = us76_logarithm(h)
     a, c = _A[0], _C[0]

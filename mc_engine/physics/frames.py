@@ -56,7 +56,10 @@ def geodetic_latitude(x, y, z, altitude, polar_radius, e2):
 
 @physics
 def velocity_angles(x, y, z, vx, vy, vz):
-    """(flight-path angle, heading) [rad] of a velocity at a place, both in the same axes, z to the north pole."""
+    """(flight-path angle, heading) [rad] of a velocity at a place, both in the same axes, z to the north pole.
+
+    Exactly on the axis, x = y = 0, both angles are 0, whatever the velocity.
+    """
     p2 = x * x + y * y
     outward = x * vx + y * vy
     east = (x * vy - y * vx) * sqrt(p2 + z * z)
@@ -97,13 +100,16 @@ def radius_at_altitude(
 
 @physics
 def full_turn(angle):
-    """The angle [rad] in [0, 2 pi)."""
+    """The angle [rad] from 0 to 2 pi, both ends included: -1e-20 becomes 2 pi.
+
+    Beyond the ends by the rounding of the given angle at most: -2e-12 after 2000 turns.
+    """
     return angle - TURN * floor(angle * (1.0 / TURN))
 
 
 @physics
 def half_turn(angle):
-    """The angle [rad] in [-pi, pi]."""
+    """The angle [rad] from -pi to pi; beyond the ends by the rounding of the given angle at most, as `full_turn`."""
     return angle - TURN * rint(angle * (1.0 / TURN))
 
 

@@ -1,8 +1,8 @@
 """Acceleration of a body of arbitrary shape: spherical harmonics to any degree and order, in body-fixed axes.
 
-The coefficients of the Earth are those of EGM2008 to degree 8: at the geostationary radius degree 5 and above
-together are below 1e-11 m/s^2.  In compiled flights degree and order are settings; the coefficients stand in the
-model's tables, so one kernel serves all.
+The coefficients of the Earth are those of EGM2008 to degree 8: at the geostationary radius degrees 5 to 8 together
+are up to 3e-10 m/s^2, and degree 8 alone is below 1e-12 m/s^2.  In compiled flights degree and order are settings;
+the coefficients stand in the model's tables, so one kernel serves all.
 """
 
 from math import factorial
@@ -72,7 +72,8 @@ def harmonics_table(degree: int, order: int) -> np.ndarray:
     """What `harmonics` reads: float64[n_rows, COLUMNS], column after column of the functions V and W.
 
     The row of degree i and order j: the four products of V and W that join the acceleration along x and y, the two
-    along z, and both factors of the recursion.  Terms of orders above `order` are left out.
+    along z, and both factors of the recursion.  Terms of orders above `order` are left out; there
+    are none of degrees above 8.
     """
     c, s = np.zeros((degree + 3, degree + 3)), np.zeros((degree + 3, degree + 3))
     for n, m, normal_c, normal_s in EGM2008:

@@ -145,9 +145,9 @@ def from_small_angles(angles):
 def from_two_vectors(a, b):
     """The shortest rotation q with rotated(q, a) along b.  For opposite vectors, half a turn about some axis across.
 
-    a, b : of any length but zero.  Frames: the axes of the second frame are those of the first, turned by q.
-    The direction is right to 1e-15, next to opposite vectors, too: there the sum of both directions h has no rounding,
-    and cos(angle / 2) and the axis come from it as |h|^2 / 2 and a x h.
+    a, b : of lengths from 1e-150 to 1e154, not zero.  Frames: the axes of the second frame are those of the first,
+    turned by q.  The direction is right to 1e-15, next to opposite vectors, too: there the sum of both directions h has
+    no rounding, and cos(angle / 2) and the axis come from it as |h|^2 / 2 and a x h.
     """
     a, b = unit(a), unit(b)
     h = added(a, b)

@@ -1,8 +1,8 @@
 """Sun and Moon as seen from the Earth's centre, and what they do to a satellite's motion.
 
 Positions come from pyerfa and stand in a table that compiled flights interpolate: the Sun by the Earth's motion of
-`erfa.epv00` (better than 0.1"), the Moon by `erfa.moon98` (a few arc seconds, J. Meeus, Astronomical Algorithms, 2nd
-ed., chapter 47, after ELP 2000-82).  Interpolation adds less than 0.02" to the Moon.
+`erfa.epv00` (better than 0.1"), the Moon by `erfa.moon98` (3" r.m.s. and up to 13", J. Meeus, Astronomical Algorithms,
+2nd ed., chapter 47, after ELP 2000-82).  Interpolation adds less than 0.02" to the Moon.
 
 Axes: mean equator and equinox of date, z to the pole.  Within 30 days they turn by 4", which flights leave out; UT1 is
 taken as UTC, within 0.9 s or 14".

@@ -25,13 +25,16 @@ def cross(a, b):
 
 @physics
 def norm(a):
-    """Length of a.  Overflows for components above 1e154."""
+    """Length of a, of 1e-150 to 1e154.
+
+    The squares of shorter vectors lose digits and are zero below 1e-162; those of longer ones are infinite.
+    """
     return sqrt(dot(a, a))
 
 
 @physics
 def unit(a):
-    """a divided by its length; not a number for the zero vector."""
+    """a divided by its length, which must be as in `norm`; not a number for the zero vector."""
     return scaled(1.0 / norm(a), a)
 
 
