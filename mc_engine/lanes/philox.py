@@ -34,7 +34,10 @@ def philox_words(key: int, counter: tuple[int, int, int, int]) -> tuple[int, int
 
 
 def uniform_pair(draws, index):
-    """Two numbers in [0, 1) with 52 random bits each; `index` numbers the pairs drawn at one sample."""
+    """Two numbers in [0, 1) with 52 random bits each; `index` numbers the pairs drawn at one sample.
+
+    Sample and index count by their last 32 bits: index -1 is 2**32 - 1, and 2**32 is 0.
+    """
     case = int(draws.case)
-    words = philox_words(int(draws.key), (case & _WORD, case >> 32, int(draws.sample), int(index)))
+    words = philox_words(int(draws.key), (case & _WORD, case >> 32, int(draws.sample) & _WORD, int(index) & _WORD))
     return tuple(((words[2 * i] << 20) | (words[2 * i + 1] >> 12)) * 2.0**-52 for i in range(2))

@@ -52,6 +52,19 @@ def test_draws_are_the_words_of_philox_at_the_address_of_case_sample_and_index(s
     np.testing.assert_array_equal(ours[:4].T, expected)
 
 
+@physics
+def _draw_at_the_edges(case, sample):
+    draws = Draws(KEY, case, sample)
+    return *normal_pair(draws, -1), *uniform_pair(draws, 2**32 - 1), *uniform_pair(draws, 2**40 + 7)
+
+
+@pytest.mark.parametrize("sample", [3.0, 2.0**32 + 5.0])
+def test_indices_and_samples_count_by_their_last_32_bits_in_python_too(sample):
+    cases = np.arange(8.0)
+    ours = np.transpose([_draw_at_the_edges(case, sample) for case in cases.tolist()])
+    np.testing.assert_array_equal(bits(by_every_width(_draw_at_the_edges, 6, cases, sample)), bits(ours))
+
+
 def test_python_draws_the_same_bits_as_the_compiler():
     cases = np.arange(40.0)
     expected = np.transpose([_draw(case, 3.0) for case in cases.tolist()])
