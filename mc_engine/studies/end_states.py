@@ -47,7 +47,7 @@ def write_oem(store: Store, columns: Sequence[str], out: Path, epoch: str, frame
     """
     try:
         start = modified_julian_date(epoch)
-    except ValueError:
+    except (ValueError, OverflowError):
         raise StoreError(f'epoch "{epoch}" is no date such as 2026-01-31T12:00:00') from None
     table = store.cases(["case_id", "status", END_TIME, *columns])
     flown = table[table["status"] == STATUS_NAME[OK]]
