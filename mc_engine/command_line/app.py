@@ -201,8 +201,10 @@ def existing_run(path: Path) -> "Store":
 def _no_run(path: Path) -> str:
     """Why a path is no run directory, and what to do."""
     from mc_engine.campaign.search import campaign_names
-    from mc_engine.store.run_files import runs_in
+    from mc_engine.store.run_files import kind_of, runs_in
 
+    if kind := kind_of(path):
+        return f"holds a {kind} and no run; `mc-engine status {shell_word(path)}` shows what was found"
     if str(path) in campaign_names():
         return f"is a campaign and no run; `mc-engine run {shell_word(path)}` flies it"
     if not path.exists():

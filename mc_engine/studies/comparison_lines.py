@@ -17,7 +17,7 @@ _HEADINGS = ("metric", "shift", "in sigma of A", "adjusted p", "spread B/A", "ad
 def comparison_lines(comparison: Comparison) -> Iterator[str]:
     """All that a reader needs to act on, the answer last."""
     for letter, name, cases, ok in zip("AB", comparison.names, comparison.cases, comparison.ok, strict=True):
-        yield f"{letter}  {name}: {cases:,} cases, {ok:,} completed"
+        yield f"{letter}  {name}: {cases:,} case{'s' * (cases != 1)}, {ok:,} completed"
     yield comparison.pairing.reason
     for verdict in comparison.verdicts:
         inside = verdict.inside_words("{:,}".format)
@@ -35,7 +35,8 @@ def comparison_lines(comparison: Comparison) -> Iterator[str]:
 
 def answer(comparison: Comparison) -> str:
     """The whole comparison in a sentence."""
-    held = f"{comparison.n_tests} tests, at most one chance in {1.0 / comparison.alpha:.0f} of any false alarm"
+    tests = "1 test" if comparison.n_tests == 1 else f"{comparison.n_tests} tests"
+    held = f"{tests}, at most one chance in {1.0 / comparison.alpha:.0f} of any false alarm"
     if not comparison.changed:
         return f"no significant change ({held})"
     parts = [

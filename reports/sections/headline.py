@@ -147,7 +147,8 @@ def warnings(flown: Flown) -> tuple[str, ...]:
             "“mc-engine resume .”, typed in the run’s folder, flies them."
         )
     if flown.n_tried and not flown.every.completed:
-        sentences.append(f"All {count(flown.n_tried)} cases failed: no metric has a number.")
+        every = "The only case" if flown.n_tried == 1 else f"All {count(flown.n_tried)} cases"
+        sentences.append(f"{every} failed: no metric has a number.")
     elif failed := flown.n_tried - flown.every.completed:
         sentences.append(
             f"{count(failed)} of {count(flown.n_tried)} cases failed; they count against every requirement."

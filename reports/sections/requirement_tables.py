@@ -157,7 +157,8 @@ def risk_table(flown: Flown) -> Table | None:
         Column("With confidence shared", "text"),
     )
     rows = tuple(_risk_row(verdict, len(judged)) for verdict in judged)
-    note = f"Allowed outside: the most of these {count(flown.n_tried)} cases with which the requirement still passes. "
+    of = "of the one case" if flown.n_tried == 1 else f"of these {count(flown.n_tried)} cases"
+    note = f"Allowed outside: the most {of} with which the requirement still passes. "
     if flown.looked:
         note += (
             "The number of cases was not fixed in advance: the consumer’s risk is then below the figure given, "

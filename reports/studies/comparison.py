@@ -31,7 +31,7 @@ from reports.run.chosen_units import ShownRun, chosen_unit
 from reports.run.flown import Flown, Run
 from reports.studies.comparison_figure import change_figure
 from reports.studies.comparison_overlays import overlay_blocks
-from reports.text.numbers import SPACE, axis_label, count, fixed, given_percent, number, percent, words
+from reports.text.numbers import SPACE, axis_label, count, counted, fixed, given_percent, number, percent, words
 
 LEAST_P = 1e-12  # a smaller p-value means no more
 ROUNDING = 1e-12  # of a mean: a smaller standard deviation is none
@@ -123,7 +123,7 @@ def build_comparison(comparison: Comparison, runs: tuple[Run, Run] | None = None
 
 def _change_sentence(comparison: Comparison) -> str:
     chance = (
-        f"{count(comparison.n_tests)} tests; at most {percent(comparison.alpha, up=True)} chance of any false alarm"
+        f"{counted(comparison.n_tests, 'test')}; at most {percent(comparison.alpha, up=True)} chance of any false alarm"
     )
     what = (
         "Significant changes from run A to run B" if comparison.changed else "No significant change from run A to run B"
@@ -139,7 +139,7 @@ def _run_facts(comparison: Comparison) -> tuple[tuple[str, str], ...]:
     for letter, name, cases, ok, created in zip(
         "AB", _short_names(comparison.names), comparison.cases, comparison.ok, comparison.created, strict=True
     ):
-        flown = f"{count(cases)} cases, {count(ok)} completed"
+        flown = f"{counted(cases, 'case')}, {count(ok)} completed"
         facts.append((f"Run {letter}", f"{name}: {flown}, {created[:16].replace('T', ' ')}".rstrip(", ")))
     return (*facts, ("Cases", f"{reason[:1].upper()}{reason[1:]}"))
 

@@ -28,9 +28,9 @@ def with_numbers(run, low, high):
 UNDRAWN = "numbers beyond 1e140 or a standard deviation below 1e-140: propellant."
 SMALL = {
     "no case": (synthetic_run(0, failed=0), "No case was flown."),
-    "one case": (synthetic_run(1, failed=0), "too few cases"),
+    "one case": (synthetic_run(1, failed=0), "the most of the one case with which"),
     "two cases": (synthetic_run(2, failed=0), "too few cases"),
-    "one failed case": (synthetic_run(1, failed=1), "All 1 cases failed"),
+    "one failed case": (synthetic_run(1, failed=1), "The only case failed"),
     "all failed": (synthetic_run(30, failed=30), "All 30 cases failed: no metric has a number."),
     "constant": (constant(synthetic_run(30, failed=0)), "the same in all cases"),
     "the whole range of numbers": (with_numbers(synthetic_run(300, failed=0), -1.7e308, 1.7e308), UNDRAWN),

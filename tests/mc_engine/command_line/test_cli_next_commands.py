@@ -35,10 +35,15 @@ def test_a_slip_is_answered_with_what_is_there_or_the_next_command(here):
         small_store(here / "runs" / name)
     (here / "other").mkdir()
     (here / "other" / "case.toml").write_text("")
+    for kind in ("tuning", "rare"):
+        (here / f"its {kind}").mkdir()
+        (here / f"its {kind}" / f"{kind}.json").write_text("{}")
     for words, said in [
         (["status", "deorbit"], "deorbit: is a campaign and no run; `mc-engine run deorbit` flies it"),
         (["status", "runs"], "runs: is no run directory; it holds 2 runs, the latest is runs/a"),
         (["status", "cart"], "cart: is no run directory; `mc-engine run` makes one"),
+        (["summary", "its tuning"], "its tuning: holds a tuning and no run; `mc-engine status 'its tuning'` shows"),
+        (["resume", "its rare"], "its rare: holds a rare event and no run; `mc-engine status 'its rare'` shows what"),
         (["run", "runs"], "holds no campaign.toml; `mc-engine init DIR` makes a campaign in a new folder"),
         (["run", "other"], "holds no campaign.toml, but other/case.toml"),
         (["check", "cart/model.py"], "is no campaign file; name the .toml file that names this model"),

@@ -1,5 +1,7 @@
 """`mc-engine compare`: pairing, what changed, the answer and its exit status."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from comparable_runs import TEXT, run
@@ -21,6 +23,13 @@ def test_the_same_run_again_is_no_change(tmp_path):
     assert all(one.same for one in found.metrics)
     assert (found.code, found.campaign, found.diff) == ((), (), ())
     assert "no significant change" in list(comparison_lines(found))[-1]
+
+
+def test_one_case_and_one_test_are_counted_as_one(tmp_path):
+    found = compared(run(tmp_path / "a"), run(tmp_path / "b"))
+    first, *_, last = comparison_lines(replace(found, cases=(1, 400), metrics=(), shares=found.shares[:1]))
+    assert first.endswith("a: 1 case, 400 completed")
+    assert "(1 test, at most" in last
 
 
 def test_counts_by_the_limits_of_one_run_and_of_each_are_told_apart(tmp_path):
