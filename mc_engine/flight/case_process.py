@@ -31,6 +31,8 @@ from mc_engine.status import CRASHED, TIME_LIMIT
 START_S = 600.0  # for `start`
 LOOK_EVERY_S = 0.2  # whether the run is to stop
 _idle: dict[tuple[Any, ...], list["CaseProcess"]] = {}
+_alive: set["CaseProcess"] = set()  # waiting or flying
+_ending = threading.Event()  # once this process is about to end
 _lock = threading.Lock()
 # A process ends with the thread that started it, so one thread that lives as long as this process starts all.
 _starter: list[ThreadPoolExecutor] = []
@@ -55,6 +57,7 @@ class CaseProcess:
                 if not _starter:
                     _starter.append(ThreadPoolExecutor(1, thread_name_prefix="mc-engine-starter"))
             self._process = _starter[0].submit(self._start, theirs.fileno()).result()
+            _alive.add(self)
         finally:
             theirs.close()
         self._connection: Connection[Any, Any] = Connection(ours.detach())
@@ -99,6 +102,8 @@ class CaseProcess:
                     raise reply
                 yield reply
         except (EOFError, ConnectionError):
+            if _ending.is_set():
+                threading.Event().wait()
             code = self._process.wait()
             raise CaseEnded(CRASHED, f"{how_it_ended(code)}{_crash_site(end_of(self.work / STDERR))}") from None
 
@@ -122,16 +127,20 @@ class CaseProcess:
     def end(self, keep: Callable[[Path], None] | None = None) -> None:
         """End the process and what it began.  keep : called with its folder before that is removed."""
         self._connection.close()
+        self._kill()
+        if keep is not None:
+            keep(self.work)
+        shutil.rmtree(self.work, ignore_errors=True)
+
+    def _kill(self) -> None:
         for stop in (lambda: os.killpg(self._process.pid, signal.SIGKILL), self._process.kill):
             try:
                 stop()
             except (ProcessLookupError, PermissionError):
                 continue
         self._process.wait()
+        _alive.discard(self)
         end_noted(self.work)
-        if keep is not None:
-            keep(self.work)
-        shutil.rmtree(self.work, ignore_errors=True)
 
 
 def _crash_site(stderr: bytes) -> str:
@@ -164,6 +173,17 @@ def take(key: tuple[Any, ...], setup: Callable[[], Setup]) -> CaseProcess:
 def _end_idle() -> None:
     for process in (process for waiting in _idle.values() for process in waiting):
         process.end()
+
+
+def end_all() -> None:
+    """End all processes, also those that fly a case, with what they began; for a process that then ends at once.
+
+    A thread that flies a case learns nothing of it: it must not tell a case that was ended here as crashed.
+    """
+    _ending.set()
+    for process in list(_alive):
+        process._kill()
+        shutil.rmtree(process.work, ignore_errors=True)
 
 
 def give_back(key: tuple[Any, ...], process: CaseProcess) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from mc_engine.campaign.loading import Campaign
 from mc_engine.durable_file import leave, names_in, publish, remove_file, temporary_name
 from mc_engine.errors import StoreError
+from mc_engine.flight.case_process import end_all
 from mc_engine.flight.chunks import Task, run_task
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import ignore_signals
@@ -108,6 +109,7 @@ class Watch:
     def _end(self, in_flight: str, late: str) -> None:
         try:
             publish(self._run, in_flight, late)
+            end_all()
         finally:
             os._exit(1)  # a thread in compiled code cannot be ended otherwise
 
@@ -158,7 +160,10 @@ def _end_with(parent: int) -> None:
     """End this process when its parent has died.  Windows keeps the parent's number; there, idle workers time out."""
     while os.getppid() == parent:
         time.sleep(LOOK_EVERY_S)
-    os._exit(1)
+    try:
+        end_all()
+    finally:
+        os._exit(1)
 
 
 @lru_cache(maxsize=1)
