@@ -99,7 +99,7 @@ def _as_writer(store: Store, command: str, session: Session) -> Iterator[threadi
     except (StoreError, RunInterrupted, KeyboardInterrupt) as error:
         why = str(error)
         if not (store.path / JOURNAL).exists():
-            why = f"{store.path}: was moved or removed while the run was flying; it still holds what was committed,"
+            why = f"{store.path}: was moved or removed while the run was flying; if it was moved, no case is lost and"
             place = "NEW_PLACE"
         elif isinstance(error, DiskError):
             why += "; what was committed is safe,"
