@@ -180,12 +180,11 @@ def _none_completing(campaign: Campaign, flown: Columns) -> Iterator[str]:
     words, counts = np.unique(status.astype(str), return_counts=True)
     word = str(words[counts.argmax()])
     text = {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()}[word]
-    reasons = [str(reason) for reason in flown["reason"] if reason]
     sentence = f"none of the first {status.size} cases completes: {counts.max()} are {word}"
     first = int(np.flatnonzero(status == word)[0])
     where = [str(flown["reason"][first])]  # with phases, that of the end
     if word == "refused":
-        text, where = reasons[0] if reasons else text, []
+        text, where = where[0], []
     elif word == "no-stop":
         text = why_no_stop(campaign)
     else:

@@ -227,7 +227,9 @@ def wrong_import(error: BaseException) -> str:
     missing, module = re.match(r"cannot import name '(\w+)'", str(error)), sys.modules.get(error.name or "")
     if missing is None or module is None:
         return ""
-    return f'{error.name} has no "{missing[1]}"{hint(missing[1], getattr(module, "__all__", [*vars(module)]))}'
+    file = getattr(module, "__file__", None)  # the name of a module beside the model's file is the engine's
+    who = Path(file).name if file and is_the_users(Path(file)) else error.name
+    return f'{who} has no "{missing[1]}"{hint(missing[1], getattr(module, "__all__", [*vars(module)]))}'
 
 
 def _place_and_cause(error: Exception) -> tuple[str, str]:

@@ -274,5 +274,6 @@ def _fault(reference: str, error: BaseException) -> str:
     if words := wrong_record(error) or wrong_import(error):
         return f"{place}: {words}"
     text = error.msg if isinstance(error, SyntaxError) else str(error)
-    text += "; save the file as UTF-8" if "encoding" in text or "codec can't decode" in text else ""
+    if isinstance(error, SyntaxError | UnicodeError) and re.search("encoding|'utf-8' codec", text):
+        text += "; save the file as UTF-8"
     return f"{place}: {type(error).__name__}: {text}"

@@ -57,7 +57,8 @@ def curve_files(source: bytes) -> frozenset[str]:
 def repeated(tree: ast.Module) -> Iterator[tuple[int, str, int]]:
     """(line, key of a dictionary or function of the module, line before) of what a source says twice.
 
-    Python keeps the last alone.  A function that is used before it is defined again is none.
+    Python keeps the last alone.  A function that is used before it is defined again is none, nor one that a decorator
+    may keep, as `overload` does.
     """
     for node in ast.walk(tree):
         met: dict[object, int] = {}
@@ -68,13 +69,14 @@ def repeated(tree: ast.Module) -> Iterator[tuple[int, str, int]]:
                 met[key.value] = key.lineno
     defined: dict[str, int] = {}
     for statement in tree.body:
-        if not isinstance(statement, ast.FunctionDef):
-            for node in ast.walk(statement):
+        function = statement if isinstance(statement, ast.FunctionDef) else None
+        for part in [function.args, *function.decorator_list] if function else [statement]:
+            for node in ast.walk(part):
                 defined.pop(getattr(node, "id", ""), 0)
-            continue
-        if statement.name in defined:
-            yield statement.lineno, f"the function `{statement.name}`", defined[statement.name]
-        defined[statement.name] = statement.lineno
+        if function and function.name in defined:
+            yield function.lineno, f"the function `{function.name}`", defined[function.name]
+        if function and all(getattr(item, "id", "") == "physics" for item in function.decorator_list):
+            defined[function.name] = function.lineno
 
 
 def _arguments(calls: list[ast.Call], name: str) -> list[ast.expr]:

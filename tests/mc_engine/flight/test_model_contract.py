@@ -13,7 +13,7 @@ from mc_engine.campaign.loading import load_campaign
 from mc_engine.errors import CampaignError
 from mc_engine.flight import missing_events, repeatability
 from mc_engine.flight.contract import breaches
-from mc_engine.flight.contract_flight import faults
+from mc_engine.flight.contract_flight import _none_completing, faults
 from mc_engine.flight.flight import fly
 from mc_engine.flight.interpreted import InterpretedFlight
 from mc_engine.flight.kernel_parts import watching_events
@@ -203,6 +203,12 @@ def test_a_stopping_event_that_a_sample_carries_over_zero_is_named_with_the_time
     place = f"model.py, line {line_of(tmp_path, 'MODEL = model(') + 2}"
     assert f'limit: {place}: the event "apogee" does not happen where a sample of the control, `switch`' in sentence
     assert "carries it over zero, at 500 s in the nominal case; let its function depend on the state" in sentence
+
+
+def test_where_no_case_can_start_the_sentence_has_the_reason_of_one_that_cannot():
+    reasons = np.array(['in the phase "coast"', "too low", "too low"], dtype=object)
+    flown = {"status": np.array(["no-stop", "refused", "refused"]), "reason": reasons}
+    assert only([*_none_completing(None, flown)]).endswith("2 are refused (too low)")
 
 
 def test_where_no_case_completes_the_sentence_says_when_the_first_ends(tmp_path):

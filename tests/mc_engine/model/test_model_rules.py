@@ -1,7 +1,9 @@
 """Records of a model that contradict themselves or one another: named where the model is made."""
 
+import pytest
 from mistaken_campaign import campaign_with, given, in_front, refused, with_evaluate, with_input
 
+from mc_engine.errors import CampaignError
 from mc_engine.flight.contract import breaches
 
 IMPORTS = "from mc_engine.lanes import"
@@ -86,8 +88,13 @@ def test_a_key_or_a_function_of_which_python_keeps_the_last_alone_is_named(tmp_p
     climb = "@physics\ndef climb(s):\n    return s.x"
     (found,) = breaches(campaign_with(tmp_path / "twice", in_front(climb)))
     assert "the function `climb` is in line" in found
-    used = in_front(f"OTHER = Event(climb)\n\n\n{climb}")
-    assert breaches(campaign_with(tmp_path / "used", used)) == []
+    kept = (
+        in_front(f"OTHER = Event(climb)\n\n\n{climb}"),
+        in_front(f"def other(s, of=climb):\n    return of(s)\n\n\n{climb}"),
+        in_front("from typing import overload\n\n\n@overload\ndef climb(s): ...", "climb"),
+    )
+    for number, edit in enumerate(kept):
+        assert breaches(campaign_with(tmp_path / str(number), edit)) == []
 
 
 VY, ALTITUDE = 'vy_m_s="vy", class_m="more"', 'altitude_km="altitude", lambda_m="more"'
@@ -113,6 +120,19 @@ LINES = [
 def test_a_record_made_wrongly_and_an_import_from_a_dot_are_named_at_their_line(tmp_path):
     for number, (old, new, text, sentence) in enumerate(LINES):
         refused(tmp_path / str(number), [(old, new)], sentence, text)
+
+
+def test_only_a_file_in_another_encoding_is_to_be_saved_as_utf_8(tmp_path):
+    for wrong in ("raise KeyError('encoding')", "FOLDER = 'C:\\Users'"):
+        with pytest.raises(CampaignError) as error:
+            campaign_with(tmp_path / wrong[:5], (IMPORTS, f"{wrong}\n{IMPORTS}"))
+        assert "save the file" not in str(error.value)
+
+
+def test_a_module_beside_the_model_is_called_by_its_file(tmp_path):
+    campaign_with(tmp_path)
+    (tmp_path / "guidance.py").write_text("gain = 1.0\n")
+    refused(tmp_path, [(IMPORTS, f"from guidance import gian\n{IMPORTS}")], ': guidance.py has no "gian"; did you mean')
 
 
 def test_a_model_in_the_form_of_version_0_1_is_pointed_to_the_change_log(tmp_path):
