@@ -35,8 +35,9 @@ def comparison_lines(comparison: Comparison) -> Iterator[str]:
 
 def answer(comparison: Comparison) -> str:
     """The whole comparison in a sentence."""
-    tests = "1 test" if comparison.n_tests == 1 else f"{comparison.n_tests} tests"
-    held = f"{tests}, at most one chance in {1.0 / comparison.alpha:.0f} of any false alarm"
+    held = "1 test" if comparison.n_tests == 1 else f"{comparison.n_tests} tests"
+    if not comparison.chosen:
+        held += f", at most one chance in {1.0 / comparison.alpha:.0f} of any false alarm"
     if not comparison.changed:
         return f"no significant change ({held})"
     parts = [

@@ -122,9 +122,9 @@ def build_comparison(comparison: Comparison, runs: tuple[Run, Run] | None = None
 
 
 def _change_sentence(comparison: Comparison) -> str:
-    chance = (
-        f"{counted(comparison.n_tests, 'test')}; at most {percent(comparison.alpha, up=True)} chance of any false alarm"
-    )
+    chance = counted(comparison.n_tests, "test")
+    if not comparison.chosen:
+        chance += f"; at most {percent(comparison.alpha, up=True)} chance of any false alarm"
     what = (
         "Significant changes from run A to run B" if comparison.changed else "No significant change from run A to run B"
     )

@@ -180,6 +180,7 @@ def test_a_requirement_is_not_demonstrable_on_chosen_cases_and_the_tests_are_sai
     (fuel,) = found.verdicts
     assert fuel.words == "pass → not demonstrable"
     assert found.worse_verdicts == ()  # of the design alone
-    *_, note, _ = comparison_lines(found)
+    *_, note, answer = comparison_lines(found)
     assert note.startswith("note: the cases of run B (design grid) were chosen, not drawn at random: p-values")
+    assert "false alarm" not in answer
     assert compared(run(tmp_path / "c"), run(tmp_path / "d")).chosen == ""
