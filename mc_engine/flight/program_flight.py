@@ -299,9 +299,9 @@ def _content(folder: Path, name: str) -> bytes:
 
 
 def _text(folder: Path, name: str) -> str:
-    """The text of a file that a program wrote, with or without a byte order mark."""
+    """The text of a file that a program wrote, with or without a byte order mark; lines end in "\\n"."""
     try:
-        return _content(folder, name).decode("utf-8-sig")
+        return io.TextIOWrapper(io.BytesIO(_content(folder, name)), "utf-8-sig").read()
     except UnicodeDecodeError as error:
         raise ValueError(f"{name} is not text in UTF-8: {error}") from None
 
@@ -309,12 +309,12 @@ def _text(folder: Path, name: str) -> str:
 def _document(folder: Path, name: str) -> Any:
     """The result as nested mappings and lists; of a CSV, its one row by column."""
     text = _text(folder, name)
-    if name.endswith(".json"):
-        try:
+    try:
+        if name.endswith(".json"):
             return json.loads(text)
-        except (ValueError, RecursionError) as error:
-            raise ValueError(f"{name} cannot be read: {error}") from None
-    rows = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
+        rows = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
+    except (ValueError, RecursionError, csv.Error) as error:
+        raise ValueError(f"{name} cannot be read: {error}") from None
     if len(rows) != 2 or len(rows[0]) != len(rows[1]):
         fields = " and ".join(str(len(row)) for row in rows[:2]) or "no"
         found = f"{len(rows)} rows, the first of {fields} fields"
@@ -325,13 +325,13 @@ def _document(folder: Path, name: str) -> Any:
 def _table(folder: Path, name: str) -> tuple[list[str], np.ndarray]:
     """(names of the columns, float64[rows, columns]) of a CSV."""
     first, _, rest = _text(folder, name).partition("\n")
-    names = [column.strip() for column in next(csv.reader([first]), [])]
-    if not rest.strip():
-        return names, np.empty((0, len(names)))
     try:
+        names = [column.strip() for column in next(csv.reader([first]), [])]
+        if not rest.strip():
+            return names, np.empty((0, len(names)))
         table = np.loadtxt(io.StringIO(rest), delimiter=",", ndmin=2)
-    except ValueError as error:
-        raise ValueError(f"{name} cannot be read: {str(error).partition(';')[0]}") from None  # then what NumPy could do
+    except (ValueError, csv.Error) as error:  # NumPy's says behind a semicolon what NumPy could do
+        raise ValueError(f"{name} cannot be read: {str(error).partition(';')[0]}") from None
     if table.shape[1] != len(names):
         raise ValueError(f"{name} has {table.shape[1]} columns, and names of {len(names)}")
     return names, table

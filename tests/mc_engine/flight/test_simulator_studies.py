@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from mc_engine import load_campaign, open_run, open_store, run
 from mc_engine.command_line.commands import app
+from mc_engine.flight.program_flight import _document
 from mc_engine.runner.backends import Backend
 from mc_engine.runner.runner import merge
 from mc_engine.runner.shards import Shard
@@ -136,6 +137,15 @@ def test_results_are_read_from_a_csv_or_by_patterns_over_stdout(tmp_path, flown)
         assert set(table["status"]) == {"ok"}, set(table["reason"])
         assert np.allclose(table["fall_time_s"], flown.cases()["fall_time_s"][:8], rtol=1e-15, atol=0.0)
         assert np.allclose(table["impact_speed_m_s"], flown.cases()["impact_speed_m_s"][:8], rtol=1e-12, atol=0.0)
+
+
+def test_a_csv_may_end_its_lines_by_a_return_and_one_that_cannot_be_read_is_no_result(tmp_path):
+    """Both ended the process of the case, which was said to have crashed."""
+    (tmp_path / "returns.csv").write_bytes(b"time,speed\r1.5,2\r")
+    assert _document(tmp_path, "returns.csv") == {"time": "1.5", "speed": "2"}
+    (tmp_path / "long.csv").write_text(f"time\n{'1' * 200_000}\n")
+    with pytest.raises(ValueError, match="cannot be read: field larger than"):
+        _document(tmp_path, "long.csv")
 
 
 @pytest.mark.parametrize(("slots", "most"), [pytest.param(1, 1, marks=pytest.mark.slow), (2, 2)])
