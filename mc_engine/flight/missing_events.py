@@ -169,7 +169,9 @@ def _other_way(model: Model, event: Event, looks: Looks) -> str:
 
 def _carried(model: Model, event: Event, looks: Looks) -> str:
     """Where a sample, a switch or the beginning of a phase carries an event's function over zero; "" if nowhere."""
-    signs = (1.0, -1.0) if event.direction == "either" else (DIRECTIONS[event.direction],)
+    signs: tuple[float, ...] = (DIRECTIONS[event.direction],)
+    if event.direction == "either":  # with phases it is 1 where it is not looked for: a jump that is none of its own
+        signs = () if model.phases else (1.0, -1.0)
     for (who, look), sign in product(looks.items(), signs):
         t, values = look["t_s"], sign * look[event.name]
         jumps = np.flatnonzero((t[1:] == t[:-1]) & (values[:-1] < 0.0) & (values[1:] >= 0.0))

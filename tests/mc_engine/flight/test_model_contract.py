@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from mc_engine.flight.flight import fly
 from mc_engine.flight.interpreted import InterpretedFlight
 from mc_engine.flight.kernel_parts import watching_events
 from mc_engine.flight.missing_events import _nominal_times
+from mc_engine.model import Event
 from tests.mc_engine.model.mistaken_campaign import campaign_with, given, in_front, line_of
 from tests.mc_engine.store.small_run import ENVIRONMENT
 from tests.shipped_campaigns import samples
@@ -203,6 +205,13 @@ def test_a_stopping_event_that_a_sample_carries_over_zero_is_named_with_the_time
     place = f"model.py, line {line_of(tmp_path, 'MODEL = model(') + 2}"
     assert f'limit: {place}: the event "apogee" does not happen where a sample of the control, `switch`' in sentence
     assert "carries it over zero, at 500 s in the nominal case; let its function depend on the state" in sentence
+
+
+def test_the_end_of_a_phase_that_looks_for_an_event_carries_it_over_nothing():
+    """Behind it the function of an event of either direction is 1."""
+    looks = {"the nominal case": {"t_s": np.array([0.0, 3.0, 3.0, 9.0]), "high": np.array([-2.0, -1.0, 1.0, 1.0])}}
+    event = replace(Event(None, "either"), name="high")
+    assert missing_events._carried(SimpleNamespace(phases={"powered": None}), event, looks) == ""
 
 
 def test_where_no_case_can_start_the_sentence_has_the_reason_of_one_that_cannot():
