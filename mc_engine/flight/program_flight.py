@@ -316,8 +316,8 @@ def _document(folder: Path, name: str) -> Any:
     except (ValueError, RecursionError, csv.Error) as error:
         raise ValueError(f"{name} cannot be read: {error}") from None
     if len(rows) != 2 or len(rows[0]) != len(rows[1]):
-        fields = " and ".join(str(len(row)) for row in rows[:2]) or "no"
-        found = f"{len(rows)} rows, the first of {fields} fields"
+        fields = " and ".join(str(len(row)) for row in rows[:3]) or "no"
+        found = f"{len(rows)} row{'s' * (len(rows) != 1)} of {fields} fields"
         raise ValueError(f"{name} has {found}; it must have one of names and one of numbers, of equal length")
     return {key.strip(): value for key, value in zip(*rows, strict=True)}
 

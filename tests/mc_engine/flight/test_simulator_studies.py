@@ -146,6 +146,9 @@ def test_a_csv_may_end_its_lines_by_a_return_and_one_that_cannot_be_read_is_no_r
     (tmp_path / "long.csv").write_text(f"time\n{'1' * 200_000}\n")
     with pytest.raises(ValueError, match="cannot be read: field larger than"):
         _document(tmp_path, "long.csv")
+    (tmp_path / "names.csv").write_text("time,speed\n")
+    with pytest.raises(ValueError, match="has 1 row of 2 fields; it must have one of names and one of numbers"):
+        _document(tmp_path, "names.csv")
 
 
 @pytest.mark.parametrize(("slots", "most"), [pytest.param(1, 1, marks=pytest.mark.slow), (2, 2)])
