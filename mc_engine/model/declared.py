@@ -119,7 +119,7 @@ def model(
     kernel_parameters = kernel_parameters or inputs
     phases = _phases(phases, rhs=rhs, control=control, events=events)
     declared = events_of(phases, checked_events(events))
-    kept = _memory(memory, start, control, phases, declared, metrics, outputs)
+    kept = _memory(memory, start, phases, declared, metrics, outputs)
     _refuse_idle_events(declared, switch, getattr(kernel_parameters, "_fields", ()))
     tracked, places = _extrema(metrics, outputs, extrema or {})
     seen = _called("observe", observe, kept)
@@ -211,13 +211,7 @@ def _phases(phases: Any, **others: Any) -> Mapping[str, Phase]:
 
 
 def _memory(
-    memory: Any,
-    start: Any,
-    control: Any,
-    phases: Mapping[str, Phase],
-    events: Mapping[str, Event],
-    metrics: Any,
-    outputs: Any,
+    memory: Any, start: Any, phases: Mapping[str, Phase], events: Mapping[str, Event], metrics: Any, outputs: Any
 ) -> Memory:
     """The discrete state with what the engine keeps in it for phases, delayed events and metrics at events."""
     if memory is not None and not isinstance(memory, type):
@@ -231,7 +225,7 @@ def _memory(
             raise ModelError(f'metric "{name}": there is no event "{metric.event}"{hint(metric.event, events)}')
         noted.append((metric.event, symbols.get(metric.output, "")))
     kept = Memory(memory, phases, events, noted)
-    controls = control is not None or any(phase.control for phase in phases.values())
+    controls = any(phase.control for phase in phases.values())
     if kept.kept and memory is None and (start is not None or controls):
         raise ModelError("the model has a discrete state; name its class, memory=Memory, beside phases, delayed events "
                          "and metrics at events")  # fmt: skip

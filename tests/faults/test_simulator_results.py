@@ -1,0 +1,74 @@
+"""What simulators give that is no number and no history: such a case has no result, and the reason says why."""
+
+import pytest
+
+from mc_engine import load_campaign, run
+from tests.mc_engine.flight.falling_ball import python_campaign
+
+RESULTS = {
+    "mark": ('\ufeff{"time": 1.5}', "ok", ""),
+    "text": ('{"time": " -2.5E1 "}', "ok", ""),
+    "nothing": ('{"time": null}', "ok", ""),  # of a metric that may be missing
+    "large": ('{"time": 1%s}' % ("0" * 400), "not-finite", '"fall_time_s" is infinite'),
+    "groups": ('{"time": "1_000"}', "no-result", '"fall_time_s" is 1_000, which is no number'),
+    "digits": ('{"time": "\u0661"}', "no-result", '"fall_time_s" is \u0661, which is no number'),
+    "truth": ('{"time": true}', "no-result", '"fall_time_s" is true, which is no number'),
+    "deep": ("[" * 100_000, "no-result", "result.json cannot be read: maximum recursion depth"),
+    "bytes": ("\udcff", "no-result", "result.json is not text in UTF-8"),
+}
+
+
+def test_a_result_is_read_by_the_syntax_of_numbers_and_of_text(tmp_path):
+    for case, (text, _, _) in enumerate(RESULTS.values()):
+        (tmp_path / f"{case}.json").write_bytes(text.encode(errors="surrogateescape"))
+    (tmp_path / "-1.json").write_text('{"time": 1.0}')
+    (tmp_path / "campaign.toml").write_text(f"""
+[campaign]
+cases = {len(RESULTS)}
+design = "mc"
+seed = 3
+[simulator]
+command = ["cp", "{tmp_path}/{{case_id}}.json", "result.json"]
+result = "result.json"
+parameter.mass_kg = {{ default = 10.0 }}
+metric.fall_time_s = {{ read = "time", sometimes = true }}
+[dispersion.mass_kg]
+dist = "normal"
+sigma = 0.5
+""")
+    table = run(load_campaign(tmp_path / "campaign.toml"), tmp_path / "run", workers=1).cases()
+    assert table["fall_time_s"][:2].tolist() == [1.5, -25.0]
+    for row, (_, status, reason) in zip(table.to_dict("records"), RESULTS.values(), strict=True):
+        assert row["status"] == status, row
+        assert reason in row["reason"]
+
+
+HISTORIES = {
+    "times": ("pd.DataFrame({'t_s': [0.0, 2.0, 1.5], 'speed_m_s': 1.0})", "of the history fall from 2 s to 1.5 s"),
+    "no time": (
+        "pd.DataFrame({'t_s': [0.0, float('nan')], 'speed_m_s': 1.0})",
+        "a time of the history is not",
+    ),
+    "column": ("pd.DataFrame({'t_s': [0.0], 'speed': [1.0]})", 'the history has no column "speed_m_s"'),
+    "word": ("pd.DataFrame({'t_s': [0.0], 'speed_m_s': ['fast']})", 'column "speed_m_s" of the history is no numbers'),
+    "text": ("{'t_s': [0.0], 'speed_m_s': ['1.0']}", 'column "speed_m_s" of the history is no numbers'),
+    "truth": ("pd.DataFrame({'t_s': [0.0], 'speed_m_s': [True]})", 'column "speed_m_s" of the history is no numbers'),
+    "shape": ("{'t_s': [[0.0]], 'speed_m_s': [[1.0]]}", 'column "t_s" of the history has the shape (1, 1)'),
+    "dates": ("{'t_s': np.array([1], 'm8[s]'), 'speed_m_s': [1.0]}", 'column "t_s" of the history is no numbers'),
+    "complex": ("{'t_s': [0.0], 'speed_m_s': np.ones(1) * 1j}", 'column "speed_m_s" of the history is no numbers'),
+    "lengths": ("{'t_s': [0.0, 1.0], 'speed_m_s': [1.0]}", "columns of the history have 2 and 1 rows"),
+    "number": ("3.0", "the history is a float; it must be a DataFrame"),
+}
+
+
+@pytest.mark.parametrize("options", ["", "batch=True,"], ids=["case", "batch"])
+def test_a_history_that_cannot_be_read_is_no_result(tmp_path, options):
+    one = "np.ones_like(inputs['mass_kg'])"
+    tables = ", ".join(f"lambda: {table}" for table, _ in HISTORIES.values())
+    history = f"[{tables}][int(np.ravel(case.id)[0])]()"
+    fault = f"return {{'fall_time_s': {one}, 'impact_speed_m_s': {one}}}, {history}"
+    file = python_campaign(tmp_path / "ball", cases=len(HISTORIES), fault=fault, options=options)
+    rows = run(load_campaign(file), tmp_path / "run", workers=1).cases()
+    assert set(rows["status"]) == {"no-result"}
+    for said, (_, reason) in zip(rows["reason"], HISTORIES.values(), strict=True):
+        assert reason in said
