@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from mc_engine import load_campaign, resume, run
-from mc_engine.runner.backends import Backend
 from tests.mc_engine.flight.falling_ball import program_campaign, python_campaign
 
 SAMPLE, WHOLE = (4, 50), (100, 250)  # cases with a fault, of so many: in the deep tests and in the slow ones
@@ -271,22 +270,6 @@ def test_children_left_behind_are_ended(tmp_path, faulty):
         workers=2,
     )
     assert running("4321") == []
-
-
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
-def test_a_process_of_workers_that_a_time_limit_ends_leaves_neither_children_nor_folders(tmp_path, monkeypatch):
-    fault = at((1,), "import subprocess\n    subprocess.run(['sleep', '4322'])")
-    campaign = load_campaign(python_campaign(tmp_path / "ball", cases=2, fault=fault))
-    (tmp_path / "temporary").mkdir()
-    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
-    refuse_others(
-        run(campaign, tmp_path / "run", workers=1, backend=Backend("loky", case_seconds=5.0)).cases(),
-        (1,),
-        "time-limit",
-        "took longer than 5 s",
-    )
-    assert running("4322") == []
-    assert list((tmp_path / "temporary").glob("mc-engine-*")) == []
 
 
 def more_kills():

@@ -12,11 +12,12 @@ import pytest
 from killed_runs import FORKING
 from trapped import files_of, trapped
 
-from mc_engine import open_store
+from mc_engine import load_campaign, open_store
 from mc_engine.errors import ModelError
 from mc_engine.runner import runner
 from mc_engine.runner.backends import Backend
 from mc_engine.store.verification import damage
+from tests.mc_engine.flight.falling_ball import python_campaign
 
 SLEEP_S = 0.2  # of every flight: a chunk takes long enough to be hit in the middle
 CHUNK = 50
@@ -228,3 +229,15 @@ def test_a_model_that_calls_exit_is_told_and_not_waited_for(tmp_path, backend):
     campaign = trapped(tmp_path / "campaign", 100, {70: 4})
     with pytest.raises(ModelError, match="the model ends its process"):
         runner.run(campaign, tmp_path / "run", workers=2, backend=backend)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere a function ends its own programs")
+def test_a_time_limit_of_a_simulator_leaves_neither_programs_nor_folders(tmp_path, monkeypatch):
+    fault = "if case.id == 1:\n    import subprocess\n    subprocess.run(['sleep', '4322'])"
+    campaign = load_campaign(python_campaign(tmp_path / "ball", cases=2, fault=fault))
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
+    table = runner.run(campaign, tmp_path / "run", workers=1, backend=Backend("loky", case_seconds=5.0)).cases()
+    assert table["status"].tolist() == ["ok", "time-limit"]
+    assert ["sleep", "4322"] not in [process.info["cmdline"] for process in psutil.process_iter(["cmdline"])]
+    assert list((tmp_path / "temporary").glob("mc-engine-*")) == []
