@@ -32,6 +32,11 @@ def is_number(text: str) -> bool:
     return is_real(text) or text.lower().removeprefix("+").removeprefix("-") in ("nan", "inf", "infinity")
 
 
+def counted(number: int, noun: str) -> str:
+    """A whole number with its noun: 1 case, 2,000 cases."""
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
+
+
 def percent_digits(share: float) -> str:
     """A share that somebody gave, in percent with all its digits: 99.996833 for 0.99996833."""
     return f"{(Decimal(f'{share:.{_GIVEN_DIGITS}g}') * 100).normalize():f}"

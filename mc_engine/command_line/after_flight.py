@@ -12,7 +12,6 @@ from mc_engine.command_line.app import (
     RunPlace,
     app,
     beginning,
-    counted,
     existing_run,
     exit_status,
     leave,
@@ -25,6 +24,7 @@ from mc_engine.command_line.app import (
 )
 from mc_engine.command_line.next_step import MERGE
 from mc_engine.interruption import advise
+from mc_engine.numbers_in_text import counted
 from mc_engine.shell_words import shell_word
 from mc_engine.store.urls import is_url, store_url
 from mc_engine.suggestions import hint
@@ -161,7 +161,7 @@ def verify(place: RunPlace) -> None:
     for item in items:
         typer.echo(f"{place}/{item.what}" + f"; {RESUME}" * (item.mended_by == RESUME), err=True)
     if problems:
-        leave(DAMAGED, f"{place}: {counted(problems, 'problem')}; {'; '.join(remedies(place, problems))}")
+        leave(DAMAGED, f"{place}: {counted(len(problems), 'problem')}; {'; '.join(remedies(place, problems))}")
     typer.echo(f"{place}: every byte is as it was written")
 
 
@@ -262,7 +262,7 @@ def echo_publication(folder: Path, url: str) -> None:
     from mc_engine.store.object_store import publish
 
     done = publish(folder, url)
-    files = counted(done.sent, "file")
+    files = counted(len(done.sent), "file")
     typer.echo(f"published    {done.url}: {files}, {done.sent_bytes:,} bytes; {done.kept} were there")
 
 

@@ -21,7 +21,7 @@ from typer.core import TyperGroup
 
 from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError, UsageError
 from mc_engine.interruption import INTERRUPTED, interruption_message, under_way
-from mc_engine.numbers_in_text import LARGEST_WHOLE, is_real, is_whole
+from mc_engine.numbers_in_text import LARGEST_WHOLE, counted, is_real, is_whole
 from mc_engine.shell_words import shell_word
 from mc_engine.store.run_files import NO_TEXT, readable
 from mc_engine.store.urls import is_url, store_url
@@ -210,7 +210,7 @@ def _no_run(path: Path) -> str:
     if not path.exists():
         return "there is no such folder; `mc-engine run` makes one"
     if runs := runs_in(path):
-        return f"is no run directory; it holds {counted(runs, 'run')}, the latest is {runs[-1]}"
+        return f"is no run directory; it holds {counted(len(runs), 'run')}, the latest is {runs[-1]}"
     return "is no run directory; `mc-engine run` makes one"
 
 
@@ -261,10 +261,6 @@ def refuse_unwritable_file(option: str, path: Path) -> None:
         leave(USAGE, f"{option} {path}: there is no folder {path.parent}")
     if path.is_dir():
         leave(USAGE, f"{option} {path}: is a folder; name a file")
-
-
-def counted(things: Any, word: str) -> str:
-    return f"{len(things)} {word}{'' if len(things) == 1 else 's'}"
 
 
 def ranges(ranges: list[tuple[int, int]]) -> str:

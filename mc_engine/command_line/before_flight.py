@@ -17,13 +17,12 @@ from mc_engine.command_line.app import (
     CampaignFile,
     Cases,
     app,
-    counted,
     exit_status,
     leave,
     new_file,
     refuse_unwritable_file,
 )
-from mc_engine.numbers_in_text import LEAST_SHARE
+from mc_engine.numbers_in_text import LEAST_SHARE, counted
 from mc_engine.safe_path import safe_environment
 from mc_engine.shell_words import shell_word
 
@@ -71,12 +70,12 @@ def check(
     with _flights_beside(file) if model else nullcontext() as process:
         campaign, flyer, problems = _checked(file, process)
     if problems:
-        heading = f"{campaign.model_reference}: {counted(problems, 'problem')}"
+        heading = f"{campaign.model_reference}: {counted(len(problems), 'problem')}"
         leave(USAGE, "\n".join([heading, *(f"  {problem}" for problem in problems)]))
     typer.echo(
         f"{campaign.name}: {campaign.cases:,} cases, design {campaign.design}, "
-        f"{counted(campaign.dispersions, 'dispersion')}, {counted(campaign.correlations, 'correlation')}, "
-        f"{counted(campaign.requirements, 'requirement')}; valid"
+        f"{counted(len(campaign.dispersions), 'dispersion')}, {counted(len(campaign.correlations), 'correlation')}, "
+        f"{counted(len(campaign.requirements), 'requirement')}; valid"
     )
     for line in flyer.remarks() if model else []:
         typer.echo(line)

@@ -103,7 +103,7 @@ class CaseProcess:
                 yield reply
         except (EOFError, ConnectionError):
             if _ending.is_set():
-                threading.Event().wait()
+                threading.Event().wait()  # without end, see `end_all`
             code = self._process.wait()
             raise CaseEnded(CRASHED, f"{how_it_ended(code)}{_crash_site(end_of(self.work / STDERR))}") from None
 

@@ -12,9 +12,10 @@ from mc_engine.errors import ModelError
 from mc_engine.model.fmu import CO_SIMULATION, Fmu
 from mc_engine.model.simulator import Refuse
 
-WHOLE = {"Boolean": (0, 1), "Integer": (-(2**31), 2**31 - 1), "Enumeration": (-(2**31), 2**31 - 1)}
-WHOLE |= {f"Int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)}
-WHOLE |= {f"UInt{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)}
+# what a variable of each type can hold
+_WHOLE = {"Boolean": (0, 1), "Integer": (-(2**31), 2**31 - 1), "Enumeration": (-(2**31), 2**31 - 1)}
+_WHOLE |= {f"Int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)}
+_WHOLE |= {f"UInt{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)}
 
 
 class FmuFlight:
@@ -68,8 +69,8 @@ class FmuFlight:
         """The value of a parameter; Refuse for one that the type of its variable would change."""
         variable = self._fmu.parameters[name]
         kind = self._types[variable]
-        low, high = WHOLE.get(kind, (-math.inf, math.inf))
-        if kind in WHOLE and not (value == int(value) and low <= value <= high):
+        low, high = _WHOLE.get(kind, (-math.inf, math.inf))
+        if kind in _WHOLE and not (value == int(value) and low <= value <= high):
             raise Refuse(f'{name} is {value:.15g}, and "{variable}" is a whole number from {low} to {high} ({kind})')
         return value
 

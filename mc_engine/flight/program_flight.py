@@ -22,7 +22,7 @@ import numpy as np
 
 from mc_engine.model.program import JSON_INPUT, template_environment
 from mc_engine.model.simulator import Simulator
-from mc_engine.numbers_in_text import is_number
+from mc_engine.numbers_in_text import counted, is_number
 from mc_engine.process_tree import end_children, how_it_ended, kill_group, memory_mib
 from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, NOT_FINITE, OK, STATUS_NAME, TIME_LIMIT
 from mc_engine.text import clean
@@ -317,7 +317,7 @@ def _document(folder: Path, name: str) -> Any:
         raise ValueError(f"{name} cannot be read: {error}") from None
     if len(rows) != 2 or len(rows[0]) != len(rows[1]):
         fields = " and ".join(str(len(row)) for row in rows[:3]) or "no"
-        found = f"{len(rows)} row{'s' * (len(rows) != 1)} of {fields} fields"
+        found = f"{counted(len(rows), 'row')} of {fields} fields"
         raise ValueError(f"{name} has {found}; it must have one of names and one of numbers, of equal length")
     return {key.strip(): value for key, value in zip(*rows, strict=True)}
 

@@ -19,6 +19,7 @@ from mc_engine.flight.program_flight import Flown
 from mc_engine.model.fields import Parameter, Setting
 from mc_engine.model.record import Refusals
 from mc_engine.model.simulator import Simulator
+from mc_engine.numbers_in_text import counted
 from mc_engine.status import NOT_FINITE, OK, REFUSED, STATUS_NAME
 from mc_engine.store.case_rows import Row, RowLog
 
@@ -144,8 +145,9 @@ class SimulatorFlyer(Flyer):
         workers = min(cores, self.most_workers or cores)
         whole = seconds * self._campaign.cases / workers
         takes = about(whole / 3600.0, "hours") if whole > _FEW_MINUTES else about(whole, "s")
-        who = f"{workers} worker{'s' * (workers > 1)}"
-        lines.append(f"{seconds:.3g} s a case, {takes} for {self._campaign.cases:,} cases on {who}")
+        lines.append(
+            f"{seconds:.3g} s a case, {takes} for {self._campaign.cases:,} cases on {counted(workers, 'worker')}"
+        )
         return lines
 
     @staticmethod

@@ -223,7 +223,8 @@ def wrong_import(error: BaseException) -> str:
     if not isinstance(error, ImportError):
         return ""
     if "relative import with no known parent" in str(error):
-        return "an import from a dot, which a model's file cannot have; leave it out, as in from guidance import ..."
+        fix = "leave the dot out, as in from guidance import ..."
+        return f"an import from a dot, which a model's file cannot have; {fix}"
     missing, module = re.match(r"cannot import name '(\w+)'", str(error)), sys.modules.get(error.name or "")
     if missing is None or module is None:
         return ""

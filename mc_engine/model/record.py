@@ -163,8 +163,9 @@ class Refusals:
     def mask(self) -> np.ndarray:
         """bool[n_cases], true where the case is refused."""
         # as a rule one word seen n times: to compare the words of all cases would hold back all other threads
-        apart = self.reason[:1] if self.reason.strides == (0,) else self.reason
-        return np.broadcast_to(apart != "", self.reason.shape)
+        if self.reason.strides == (0,):
+            return np.repeat(self.reason[:1] != "", self.reason.size)
+        return self.reason != ""
 
 
 def load_model(reference: str, beside: Path | None = None) -> Model:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mc_engine.errors import ModelError
+from mc_engine.numbers_in_text import counted
 from mc_engine.suggestions import hint
 from mc_engine.units import UNITS, unit_hint, unit_of, units_meant
 
@@ -65,8 +66,7 @@ def _csv(path: Path) -> dict[str, np.ndarray]:
     for number, line in lines[1:]:
         cells = line.split(",")
         if len(cells) != len(names):
-            numbers = "1 number" if len(cells) == 1 else f"{len(cells)} numbers"
-            raise ModelError(f"{path.name}, line {number}: {numbers} for {len(names)} columns")
+            raise ModelError(f"{path.name}, line {number}: {counted(len(cells), 'number')} for {len(names)} columns")
         try:
             rows.append([float(cell) for cell in cells])
         except ValueError:

@@ -5,6 +5,7 @@ from dataclasses import astuple
 
 import numpy as np
 
+from mc_engine.numbers_in_text import counted
 from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, finite, hidden_by_ties
 from mc_engine.studies.comparison import Comparison
 from mc_engine.studies.run_changes import changed_lines
@@ -17,7 +18,7 @@ _HEADINGS = ("metric", "shift", "in sigma of A", "adjusted p", "spread B/A", "ad
 def comparison_lines(comparison: Comparison) -> Iterator[str]:
     """All that a reader needs to act on, the answer last."""
     for letter, name, cases, ok in zip("AB", comparison.names, comparison.cases, comparison.ok, strict=True):
-        yield f"{letter}  {name}: {cases:,} case{'s' * (cases != 1)}, {ok:,} completed"
+        yield f"{letter}  {name}: {counted(cases, 'case')}, {ok:,} completed"
     yield comparison.pairing.reason
     for verdict in comparison.verdicts:
         inside = verdict.inside_words("{:,}".format)
@@ -35,7 +36,7 @@ def comparison_lines(comparison: Comparison) -> Iterator[str]:
 
 def answer(comparison: Comparison) -> str:
     """The whole comparison in a sentence."""
-    held = "1 test" if comparison.n_tests == 1 else f"{comparison.n_tests} tests"
+    held = counted(comparison.n_tests, "test")
     if not comparison.chosen:
         held += f", at most one chance in {1.0 / comparison.alpha:.0f} of any false alarm"
     if not comparison.changed:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.parts import Requirement
-from mc_engine.numbers_in_text import outward
+from mc_engine.numbers_in_text import counted, outward
 from mc_engine.statistics.binomial import (
     acceptance_number,
     half_rate_share,
@@ -101,8 +101,8 @@ def _allowance(cases: int, share: float, confidence: float) -> str:
         return f"  {cases:,} in the file are too few, even if none fails: {needed:,} are needed"
     just, half = (pass_chance(cases, accepted, true_share) for true_share in (share, half_rate_share(share)))
     return (
-        f"  {cases:,} cases allow {accepted:,} failure{'s' * (accepted != 1)}; they pass a system that just misses the "
-        f"share with {100.0 * just:.1f} %, one that fails half as often as it may with {100.0 * half:.1f} %"
+        f"  {cases:,} cases allow {counted(accepted, 'failure')}; they pass a system that just misses the share "
+        f"with {100.0 * just:.1f} %, one that fails half as often as it may with {100.0 * half:.1f} %"
     )
 
 

@@ -82,8 +82,9 @@ def _index_table(
         used = f"{count(int(designed.n_used[k]))} / {count(designed.n_tried)} {BLOCKS[designed.design]}"
         unit = flown.unit(name) if designed.design == "morris" else ""
         metric = Cell(axis_label(names[name], unit), small=used)
-        for row in np.argsort(-designed.values[main][:, k], kind="stable")[:MOST_INPUTS]:
-            least = ROUNDING * float(np.nanmax(designed.values[main][:, k]))
+        effects = designed.values[main][:, k]
+        least = ROUNDING * float(np.nanmax(effects))
+        for row in np.argsort(-effects, kind="stable")[:MOST_INPUTS]:
             cells = [_cell(designed.values[index][row, k], designed.reach[index][row, k], least) for index in indices]
             rows.append((metric, Cell(flown.words(designed.inputs[row])), *cells))
     if designed.design == "saltelli":

@@ -64,6 +64,10 @@ def test_a_mistake_in_the_preparation_of_cases_is_a_sentence_with_its_fix(tmp_pa
         assert found.startswith(f"model.py, line {line_of(tmp_path, place)}: `prepare`")
 
 
+def test_a_mask_of_refused_cases_may_be_changed_in_place(tmp_path):
+    assert breaches(campaign(tmp_path, "wrong = refusals.mask; wrong |= inputs.altitude < 0.0")) == []
+
+
 def test_one_number_counts_for_all_cases_and_an_array_has_one_for_each(tmp_path):
     one = campaign(tmp_path, 'more = {"altitude": 4e5, "burn_dv": inputs.burn_dv + np.arange(5.0)}')
     altitude, burn, *_ = prepare(one.model, one.nominal, 5).parameters
