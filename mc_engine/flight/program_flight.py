@@ -191,8 +191,9 @@ class ProgramFlight:
             return {}
         names, table = _table(folder, self._program.history)
         wanted = ["t_s", *(output.name for output in self._simulator.outputs)]
-        if missing := [name for name in wanted[1:] if name not in names]:
-            raise ValueError(f'{self._program.history} has no column "{missing[0]}"')
+        if wrong := [name for name in wanted[1:] if names.count(name) != 1]:
+            found = "two columns" if wrong[0] in names else "no column"
+            raise ValueError(f'{self._program.history} has {found} "{wrong[0]}"')
         places = [0, *(names.index(name) for name in wanted[1:])]  # the first column is the time, whatever its name
         return in_time({name: table[:, place] for name, place in zip(wanted, places, strict=True)})
 
@@ -307,7 +308,7 @@ def _text(folder: Path, name: str) -> str:
 
 
 def _document(folder: Path, name: str) -> Any:
-    """The result as nested mappings and lists; of a CSV, its one row by column."""
+    """The result as nested mappings and lists; of a CSV, its one row by column; a list for a name that is twice."""
     text = _text(folder, name)
     try:
         if name.endswith(".json"):
@@ -319,7 +320,9 @@ def _document(folder: Path, name: str) -> Any:
         fields = " and ".join(str(len(row)) for row in rows[:3]) or "no"
         found = f"{counted(len(rows), 'row')} of {fields} fields"
         raise ValueError(f"{name} has {found}; it must have one of names and one of numbers, of equal length")
-    return {key.strip(): value for key, value in zip(*rows, strict=True)}
+    names = [name.strip() for name in rows[0]]
+    same = {name: [value for other, value in zip(names, rows[1], strict=True) if other == name] for name in names}
+    return {name: values[0] if len(values) == 1 else values for name, values in same.items()}
 
 
 def _table(folder: Path, name: str) -> tuple[list[str], np.ndarray]:

@@ -9,6 +9,7 @@ from math import factorial
 
 import numpy as np
 
+from mc_engine.errors import ModelError
 from mc_engine.lanes import look_up, physics, sqrt
 
 # N. K. Pavlis, S. A. Holmes, S. C. Kenyon, J. K. Factor, Journal of Geophysical Research 117 (2012) B04406: EGM2008,
@@ -72,9 +73,11 @@ def harmonics_table(degree: int, order: int) -> np.ndarray:
     """What `harmonics` reads: float64[n_rows, COLUMNS], column after column of the functions V and W.
 
     The row of degree i and order j: the four products of V and W that join the acceleration along x and y, the two
-    along z, and both factors of the recursion.  Terms of orders above `order` are left out; there
-    are none of degrees above 8.
+    along z, and both factors of the recursion.  Terms of orders above `order` are left out.  Raises ModelError for a
+    degree above `LARGEST_DEGREE`.
     """
+    if degree > LARGEST_DEGREE:
+        raise ModelError(f"harmonics of degree {degree}: the coefficients at hand end at degree {LARGEST_DEGREE}")
     c, s = np.zeros((degree + 3, degree + 3)), np.zeros((degree + 3, degree + 3))
     for n, m, normal_c, normal_s in EGM2008:
         if n <= degree and m <= order:

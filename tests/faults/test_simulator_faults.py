@@ -58,6 +58,12 @@ C_FAULTS = {
         "no-result",
         "wrote no history.csv",
     ),
+    "two columns": (
+        f'{WRITE}"{{\\"time\\": 1, \\"speed\\": 1, {USED}); fclose(file); file = fopen("history.csv", "w"); '
+        'fputs("t,speed_m_s,speed_m_s\\n0,0,1\\n", file); return 0;',
+        "no-result",
+        'history.csv has two columns "speed_m_s"',
+    ),
     "exit": ('fprintf(stderr, "licence lost\\n"); return 3;', "crashed", "ended with exit code 3: licence lost"),
     "nothing": ("return 0;", "no-result", "wrote no result.json"),
     "half": ('file = fopen(argv[2], "w"); fprintf(file, "{\\"time\\": 1."); return 0;', "no-result", "cannot be read"),

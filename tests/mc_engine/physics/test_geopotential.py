@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import lpmv
 
+from mc_engine.errors import ModelError
 from mc_engine.physics.geopotential import (
     EGM2008,
     MU_EGM2008,
@@ -102,3 +103,8 @@ def test_little_is_left_beyond_the_lower_degrees_at_the_geostationary_radius():
     left = [[np.linalg.norm(ours(place, 8, 8) - ours(place, n, n)) for place in places] for n in (7, 4)]
     assert max(left[0]) < 1e-12
     assert 2e-10 < max(left[1]) < 3e-10  # as the module says, on the equator
+
+
+def test_a_degree_without_coefficients_is_refused():
+    with pytest.raises(ModelError, match="harmonics of degree 9: the coefficients at hand end at degree 8"):
+        harmonics_table(9, 2)
