@@ -372,6 +372,8 @@ def _echo_methods(campaign: "Campaign", cases: int | None, repeats: int) -> None
         mark = f", {own.case_s / timing.case_s:5.2f} times as fast" if timing is not own else "  (the model's own)"
         method, case_us = timing.clock.method, timing.case_s * 1e6
         typer.echo(f"  {method:<7} {timing.setting:<26} error {timing.error:.1e} {case_us:10,.2f} µs a case{mark}")
+    if others and others[0].case_s < own.case_s:
+        typer.echo(f"the fastest: clock={others[0].declaration}")
 
 
 def _bench_card(campaign: "Campaign", cases: int | None) -> None:

@@ -242,7 +242,8 @@ class AdaptiveStep:
     until : float, time limit [s], or str, the symbol of a setting that holds it; in a model with a stopping event, see
         `Event`
     rtol : float or str, error allowed in a step, as a fraction of the state's own size
-    atol : float, or tuple with one for each state, error allowed in a step, in SI
+    atol : float, or tuple with one for each state, error allowed in a step, in SI, beside rtol's.  It alone counts
+        where a state passes through zero: far below what matters, as 1e-9 m in an orbit, it makes steps short there.
     control_period : float, str or function of the settings, time [s] from one call of `control` to the next; steps end
         there
     method : str, "dop853" (order 8) or "dp54" (order 5)

@@ -12,7 +12,7 @@ Samples of the control stay where they are: a model with `control` is tried with
 
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -148,6 +148,13 @@ class MethodTiming:
             return f"{steps:,} steps of {self.clock.step:.4g} s"
         return f"tolerance {self.clock.rtol:.1e}"
 
+    @property
+    def declaration(self) -> str:
+        """Its clock as a model declares it."""
+        given = {item.name: (getattr(self.clock, item.name), item.default) for item in fields(self.clock)}
+        values = ", ".join(f"{name}={value!r}" for name, (value, default) in given.items() if value != default)
+        return f"{type(self.clock).__name__}({values})"
+
 
 def compare_methods(campaign: Campaign, n_cases: int | None, repeats: int) -> list[MethodTiming]:
     """The methods that reach the error of the model's own, which is the first; the others from fast to slow.
@@ -225,8 +232,8 @@ class _Trials:
     def _adaptive(self, method: str, tolerance: float) -> AdaptiveStep:
         """A clock that samples where the model's own does; absolute tolerances by the size of the states in the end."""
         period = self.until * self.every / self.n_steps if self.every else np.inf
-        scales = tuple(float(tolerance * scale) for scale in self._scales)
-        return AdaptiveStep(self.until, tolerance, scales, period, method)
+        rtol, *atol = (float(f"{tolerance * scale:.1e}") for scale in (1.0, *self._scales))
+        return AdaptiveStep(self.until, rtol, tuple(atol), period, method)
 
     def _flown(self, clock: Clock) -> dict[str, np.ndarray]:
         kind = clock.method if isinstance(clock, FixedStep) else "adaptive"

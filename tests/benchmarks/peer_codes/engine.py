@@ -60,6 +60,8 @@ def kernel_flight(problem: Problem, method: str, value: float | None, width: int
     adaptive = isinstance(model.clock, AdaptiveStep)
     if value is not None:
         inputs["tolerance" if adaptive else "step_s"] = value
+    if value is not None and adaptive and problem.sizes is not None:
+        model = replace(model, clock=replace(model.clock, atol=tuple(value * size for size in problem.sizes)))
     ready = flight.prepare(model, inputs, n)
     settings = np.ascontiguousarray(ready.settings[0])
     chosen = settings_class(model)(*settings)

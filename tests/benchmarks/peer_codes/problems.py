@@ -31,6 +31,7 @@ class Problem:
     derivative(case) -> function (t, s) -> list, of one case, on floats
     great_step : of the reference [s].  height(lib, s) : falls through zero where the flight ends, else None
     compared : first of the states that errors are taken of, and the one after the last;  unit : theirs
+    sizes : of the states [SI], of which the engine's tolerance is a part too, where states pass through zero
     """
 
     key: str
@@ -45,6 +46,7 @@ class Problem:
     height: Callable[..., Any] | None = None
     compared: tuple[int, int] = (0, 3)
     unit: str = "m"
+    sizes: tuple[float, ...] | None = None
 
     def part(self, where: slice) -> "Problem":
         """Some of the cases."""
@@ -175,6 +177,7 @@ def entry(lift_to_drag: float) -> Problem:
         3000.0,
         4.0,
         rates.entry_height,
+        sizes=(RADIUS,) * 3 + (7800.0,) * 3,
     )
 
 

@@ -101,7 +101,11 @@ def test_bench_prints_a_line_for_each_method(monkeypatch):
         "  rk4     4,320 steps of 20 s        error 2.5e-08      60.00 µs a case  (the model's own)",
         "  gj8     642 steps of 134.6 s       error 2.9e-09       5.00 µs a case, 12.00 times as fast",
         "  dop853  tolerance 1.8e-08          error 2.2e-08      12.00 µs a case,  5.00 times as fast",
+        f"the fastest: clock=FixedStep(step={86400.0 / 642}, until=86400.0, method='gj8')",
     ]
+    timings[1:] = [MethodTiming(AdaptiveStep(100.0, 1.8e-8, (1e-2, 1e-5)), 2.2e-8, 12e-6)]
+    last = CliRunner().invoke(app, ["bench", "minimal", "--methods"]).output.splitlines()[-1]
+    assert last == "the fastest: clock=AdaptiveStep(until=100.0, rtol=1.8e-08, atol=(0.01, 1e-05))"
 
 
 class Errors:
