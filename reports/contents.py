@@ -10,7 +10,7 @@ from reports.formats.json_data import run_data
 from reports.run.chosen_units import ShownRun
 from reports.run.flown import Flown, Run
 from reports.sections.case_tables import case_table, worst_tables
-from reports.sections.convergence import convergence_blocks
+from reports.sections.convergence import convergence_blocks, integration_table
 from reports.sections.corridors import corridor_blocks
 from reports.sections.diagnostics import correlation_blocks, normal_probability_blocks
 from reports.sections.figure_blocks import (
@@ -79,7 +79,7 @@ def _appendices(flown: Flown) -> Iterator[Section]:
     yield _section("metrics", "All metrics", _metrics(flown), "appendix")
     yield _section("correlations", "Correlation matrix", correlation_blocks(flown), "appendix")
     yield _section("normality", "Normal probability plots", normal_probability_blocks(flown), "appendix")
-    yield _section("convergence", "Convergence", convergence_blocks(flown), "appendix")
+    yield _section("convergence", "Convergence", [*convergence_blocks(flown), integration_table(flown)], "appendix")
     fixed = fixed_table(flown, "Parameters and settings at the model’s own values, common to all cases", False)
     yield _section("inputs", "Inputs", (fixed,), "appendix")
     yield _section("status", "Completion of the cases", (status_table(flown),), "appendix")

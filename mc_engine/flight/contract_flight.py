@@ -22,9 +22,8 @@ from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.errors import EngineError
 from mc_engine.flight.compiled import CompiledFlyer
-from mc_engine.flight.flight import grid_of
 from mc_engine.flight.flyer import NOMINAL_NOISE
-from mc_engine.flight.kernel import clock_number
+from mc_engine.flight.kernel import clock_number, finer, grid_of
 from mc_engine.flight.lost_numbers import not_finite
 from mc_engine.flight.missing_events import events_that_never_happen, why_no_stop
 from mc_engine.flight.repeatability import (
@@ -129,17 +128,16 @@ def _too_long(campaign: Campaign, nominal: Columns) -> list[str]:
     clock = model.clock
     if not isinstance(clock, FixedStep) or clock.method == "rk4":
         return []
-    n_steps, step, every = grid_of(clock, settings)
-    half = replace(clock, step=0.5 * step, until=n_steps * step, control_every=2 * every)
+    _, step, _ = grid_of(clock, settings)
     with _completed_within(2.0 * LONGEST_S, "with half of its step the nominal case has", campaign):
-        finer = results(campaign, campaign.nominal, _NOMINAL, half)
-    name, coarse, fine = "status", nominal["status"][0], finer["status"][0]
+        halved = results(campaign, campaign.nominal, _NOMINAL, finer(clock))
+    name, coarse, fine = "status", nominal["status"][0], halved["status"][0]
     if coarse == fine:
         begun = results(campaign, campaign.nominal, _NOMINAL, replace(clock, until=clock.step))
-        name = _far(model, begun, nominal, finer) if coarse == STATUS_NAME[OK] else ""
+        name = _far(model, begun, nominal, halved) if coarse == STATUS_NAME[OK] else ""
         if not name:
             return []
-        coarse, fine = (f"{row[name][0]:.3g}" for row in (nominal, finer))
+        coarse, fine = (f"{row[name][0]:.3g}" for row in (nominal, halved))
     return [f'steps of {step:g} s are too long for "{clock.method}": the nominal case has the {name} {coarse}, with '
             f"half of the step {fine}; take shorter steps, see the limits of stability in `FixedStep`, and then let "
             "`mc-engine bench --methods` find the fastest method of that accuracy"]  # fmt: skip

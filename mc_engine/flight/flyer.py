@@ -115,6 +115,14 @@ class Flyer(ABC):
             return not np.array_equal(stored, value, equal_nan=True)
         return bool(abs(stored - value) > self.tolerance * max(abs(stored), abs(value)))
 
+    def integration_changes(self, inputs: Inputs, noise: np.ndarray) -> dict[str, Any] | None:
+        """How finer steps change the metrics of some cases; None for what has no steps to be chosen.
+
+        by : in words.  tried : cases, used : those completed both ways.  changes : by metric the largest change, in its
+        unit; a metric that is missing in all of them is left out.
+        """
+        return None
+
     def lost_number(self, inputs: Inputs, noise: int, results: Columns, who: str) -> str:
         """Where a number of a failed flight became infinite or NaN, as a sentence; empty where that is not known."""
         return ""

@@ -78,7 +78,10 @@ class QuantileRecord(_Record):
 
 
 class MetricRecord(_Record):
-    """Statistics of a metric over the n_used cases, of n_tried, that have a number."""
+    """Statistics of a metric over the n_used cases, of n_tried, that have a number.
+
+    integration_change : the largest with half of the step, or a tenth of the tolerances, in the run's first cases
+    """
 
     name: str
     unit: str
@@ -90,6 +93,7 @@ class MetricRecord(_Record):
     sigma: float | None
     minimum: float | None
     maximum: float | None
+    integration_change: float | None
     quantiles: list[QuantileRecord]
 
 
@@ -250,6 +254,7 @@ def _metric_record(flown: Flown, name: str, summary: Summary) -> MetricRecord:
         sigma=_finite(summary.sd),
         minimum=summary.minimum,
         maximum=summary.maximum,
+        integration_change=flown.integration.get("changes", {}).get(name),
         quantiles=[
             QuantileRecord(
                 probability=quantile.probability, value=quantile.value, lower=quantile.lower, upper=quantile.upper

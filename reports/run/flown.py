@@ -253,6 +253,18 @@ class Flown:
         return was_looked_at(self.manifest, self.n_wanted, self.n_tried)
 
     @cached_property
+    def integration(self) -> Mapping[str, Any]:
+        """How finer steps change the metrics, in their own units, see `Flyer.integration_changes`; empty if unknown."""
+        notes = getattr(self.run, "notes", None)
+        found = [entry.facts.get("integration") for entry in (notes("finished") if callable(notes) else ())]
+        return next((facts for facts in reversed(found) if facts), {})
+
+    def integration_share(self, metric: str) -> float | None:
+        """The change of a metric by finer steps over its standard deviation; None where one of them is not known."""
+        change, summary = self.integration.get("changes", {}).get(metric), self.own.summaries.get(metric)
+        return change / summary.spread if change is not None and summary is not None and summary.spread else None
+
+    @cached_property
     def key_metrics(self) -> list[str]:
         """The metrics that matter: those with a requirement, then those that the model maps or plots; else all.
 

@@ -1,4 +1,4 @@
-"""Whether the number of cases was enough: mean and outer quantile of the metrics that matter against it."""
+"""Whether cases were enough and steps short enough: estimates against the number of cases, changes by finer steps."""
 
 from collections.abc import Iterator
 
@@ -15,10 +15,11 @@ from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.drawing.marks import Axis, Drawing, Line, Plot, between
 from reports.drawing.palette import BLUE, SKY
 from reports.run.flown import Flown
-from reports.text.numbers import count, given_percent, interval, number, percent, percentile
+from reports.text.numbers import count, given_percent, interval, number, percent, percentile, with_unit
 
 MOST_METRICS = 8
 MOST_DRAWN = 4
+LITTLE, MUCH = 0.01, 0.1  # of a standard deviation: what an error of integration may be without a word, with one
 
 
 def convergence_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
@@ -127,3 +128,34 @@ def _two_digits_up(cases: int) -> int:
     """Two digits, upwards: the estimate of the need is rough itself."""
     step = 10 ** max(len(str(cases)) - 2, 0)
     return -(-cases // step) * step
+
+
+def integration_table(flown: Flown) -> Table | None:
+    """How much finer steps change the metrics, against their spread; None where that is not known."""
+    facts, shares = flown.integration, {name: flown.integration_share(name) for name in flown.summaries}
+    known = {name: share for name, share in shares.items() if share is not None}
+    if not known:
+        return None
+    columns = (Column("Metric", "text"), Column("Largest change", "number"), Column("In its σ", "number"),
+               Column("Error of integration", "text"))  # fmt: skip
+    largest = sorted(known, key=lambda name: -known[name])[:MOST_METRICS]
+    rows = tuple(_integration_row(flown, name, known[name]) for name in largest)
+    cases = f"{count(facts['used'])} of {count(facts['tried'])} cases"
+    others = f"Of {count(len(known))} metrics, those that change most. " if len(known) > len(rows) else ""
+    note = (
+        f"The first cases of the run, flown again with {facts['by']}; {cases} completed both ways. The change is an "
+        f"estimate of the error of integration. {others}Negligible: at most {number(LITTLE)} standard deviations σ of "
+        f"the metric; small: at most {number(MUCH)}. A metric that does not vary is not told."
+    )
+    return Table(f"Change of the metrics with {facts['by']}", columns, rows, note)
+
+
+def _integration_row(flown: Flown, name: str, share: float) -> tuple[Cell, ...]:
+    change, unit = flown.integration["changes"][name], flown.own.unit(name)
+    grade = Cell("negligible", tone="good") if share <= LITTLE else Cell("small", tone="open")
+    return (
+        Cell(flown.axis(name)),
+        Cell(with_unit(number(change, 2), unit), change),
+        Cell(f"{number(share, 2)} σ", share),
+        grade if share <= MUCH else Cell("not small", small="take shorter steps", tone="bad"),
+    )

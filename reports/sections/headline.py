@@ -8,6 +8,7 @@ from mc_engine.statistics.worst import Limits
 from mc_engine.status import OK, STATUS_NAME
 from reports.document.blocks import Card
 from reports.run.flown import URGENCY, Flown
+from reports.sections.convergence import MUCH
 from reports.sections.requirement_tables import demonstrated_text
 from reports.sections.tables import TONES, limit_text
 from reports.text.numbers import count, given_percent, limit_number, number, percent, percentile, with_unit
@@ -167,6 +168,12 @@ def warnings(flown: Flown) -> tuple[str, ...]:
             f"Requirements, statistics, percentiles, worst and failed cases are those of all "
             f"{count(flown.n_tried)} cases. Figures, convergence, contributors and regions show {count(flown.n_held)} "
             "of them, one picked at random from each of equal stretches of the case numbers."
+        )
+    judged = dict.fromkeys(verdict.metric for verdict in flown.verdicts)
+    if coarse := [name for name in judged if (flown.integration_share(name) or 0.0) > MUCH]:
+        sentences.append(
+            f"With {flown.integration['by']}, {flown.listed(coarse)} would change by more than {number(MUCH)} standard "
+            "deviations: the error of integration is not small beside the spread (see Convergence)."
         )
     if not flown.random:
         sentences.append(

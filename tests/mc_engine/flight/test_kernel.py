@@ -11,6 +11,7 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,8 +21,9 @@ from mc_engine.campaign.search import SHIPPED
 from mc_engine.errors import DiskError
 from mc_engine.flight import kernel
 from mc_engine.flight.flight import fly
+from mc_engine.flight.kernel import clock_number, finer, grid_of
 from mc_engine.lanes import kernel_cache
-from mc_engine.model import load_model
+from mc_engine.model import AdaptiveStep, FixedStep, load_model
 from tests.faults.falling import MODEL as FALL
 from tests.mc_engine.store.small_run import ENVIRONMENT
 
@@ -261,3 +263,13 @@ assert fly(model, inputs, np.zeros(1, dtype=int), 1, folder=Path("case"), width=
         environment = {**ENVIRONMENT, "MC_ENGINE_CACHE": str(tmp_path / "cache")}
         done = subprocess.run(command, cwd=tmp_path / place, env=environment, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
+
+
+def test_a_finer_clock_has_half_of_the_steps_or_a_tenth_of_the_tolerances_and_the_same_samples():
+    settings = SimpleNamespace(step=0.3, tolerance=1e-6)
+    assert grid_of(FixedStep("step", 2.0, control_every=5), settings) == (7, 0.3, 5)
+    assert grid_of(finer(FixedStep("step", 2.0, control_every=5)), settings) == (14, 0.15, 10)
+    clock = finer(AdaptiveStep(10.0, "tolerance", (1e-3, 1e-6), control_period=0.5))
+    assert clock_number(clock.rtol, settings) == pytest.approx(1e-7)
+    assert clock.atol == pytest.approx((1e-4, 1e-7))
+    assert (clock.until, clock.control_period) == (10.0, 0.5)

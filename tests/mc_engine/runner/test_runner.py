@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 from mc_engine import load_campaign, open_store
+from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.errors import ModelError, RunInterrupted, StoreError
+from mc_engine.flight.flight import fly
+from mc_engine.model import FixedStep
 from mc_engine.runner import runner
 from mc_engine.store.verification import damage
 
@@ -95,6 +98,18 @@ def test_the_nominal_is_committed_before_any_other_case_begins(flown):
     events = [entry.event for entry in flown.notes()]
     assert events[:4] == ["created", "started", "nominal", "part"]
     assert events.count("nominal") == 1
+
+
+def test_a_run_ends_with_how_much_half_of_the_step_changes_its_first_cases(flown):
+    campaign, first = load_campaign("minimal", cases=2000), np.arange(16)
+    inputs = full_inputs(campaign, case_table(campaign, first))
+    halved = fly(campaign.model, inputs, first, campaign.seed, clock=FixedStep(step=5.0, until=10_000.0))
+    facts = flown.notes()[-1].facts["integration"]
+    assert (facts["by"], facts["used"], facts["tried"]) == ("half of the step", 16, 16)
+    table = flown.cases()
+    for metric in campaign.model.metrics:
+        assert facts["changes"][metric.name] == abs(halved[metric.name] - table[metric.name][:16]).max() > 0.0
+    assert not open_store(flown.path / "sensitivity").notes()[-1].facts["integration"]
 
 
 def test_the_worst_cases_keep_their_histories(tmp_path):

@@ -1,12 +1,15 @@
 """The convergence section of a report, and reports of runs with next to nothing in them."""
 
+from types import SimpleNamespace
+
 import pytest
 from synthetic_run import synthetic_run
 
 from reports.document.blocks import FigureBlock, Table
 from reports.drawing.ticks import log_ticks
 from reports.run.flown import Flown
-from reports.sections.convergence import convergence_blocks
+from reports.sections.convergence import convergence_blocks, integration_table
+from reports.sections.headline import warnings
 
 
 def blocks(run):
@@ -42,3 +45,23 @@ def test_chosen_cases_do_not_converge(design):
 def test_the_axis_of_cases_has_numbers_that_fit():
     assert log_ticks(20, 300) == [20, 50, 100, 200]
     assert log_ticks(20, 1_000_000) == [100, 1000, 10_000, 100_000, 1_000_000]
+
+
+def test_the_error_of_integration_is_told_in_standard_deviations_and_a_large_one_is_a_warning():
+    run = synthetic_run(2000, failed=3)
+    sigma = run.table[["propellant_kg", "peak_force_n", "settling_time_s"]].std(ddof=1)
+    changes = dict(zip(sigma.index, (0.5 * sigma.iloc[0], 1e-4 * sigma.iloc[1], 0.05 * sigma.iloc[2]), strict=True))
+    facts = {"by": "half of the step", "tried": 16, "used": 15, "changes": {**changes, "no_such_metric_m": 1.0}}
+    run.notes = lambda event=None: [
+        SimpleNamespace(event="finished", facts={"integration": facts}),
+        SimpleNamespace(event="finished", facts={}),  # of `rerun --failed`
+    ]
+    flown = Flown(run, "run")
+    table = integration_table(flown)
+    assert [[cell.text for cell in row[2:]] for row in table.rows] == [
+        ["0.5 σ", "not small"], ["0.05 σ", "small"], ["0.0001 σ", "negligible"],
+    ]  # fmt: skip
+    assert "15 of 16 cases" in table.note
+    [warning] = [sentence for sentence in warnings(flown) if "half of the step" in sentence]
+    assert "propellant would change by more than 0.1 standard deviations" in warning
+    assert integration_table(Flown(synthetic_run(100), "run")) is None
