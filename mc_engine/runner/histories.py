@@ -1,4 +1,4 @@
-"""Saved time histories: the chosen cases are flown once more, in batches, and sampled over time."""
+"""Cases flown once more: the chosen ones, sampled over time, for their histories; the first ones with finer steps."""
 
 from collections.abc import Callable, Sequence
 from itertools import takewhile
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _DANGEROUS = tuple(STATUS_NAME[code] for code in (WORKER_DIED, TIME_LIMIT, CRASHED, MEMORY_LIMIT, NO_RESULT))
+
+_MOST_FINER, _FINER_OF = 16, 100  # cases that fly with finer steps: one of so many, so that their time does not count
 
 
 def inputs_of(campaign: Campaign, case_id: int | None) -> tuple[dict[str, Any], int]:
@@ -58,6 +60,18 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
     if filled:
         store.write_histories({name: np.concatenate([columns[name] for columns in filled]) for name in filled[0]})
     return True
+
+
+def integration_changes(store: Store, campaign: Campaign) -> dict[str, Any] | None:
+    """How finer steps change the metrics of the first cases of a run, see `Flyer`; None of a shard or a companion."""
+    dangerous = _cases_that_ended(store, _DANGEROUS)
+    cases = [case for case in range(min(_MOST_FINER, -(-store.n_cases // _FINER_OF))) if case not in dangerous]
+    if len(store.wanted) < store.n_cases or "sensitivity" in store.manifest or not cases:
+        return None
+    table, noise = drawn(campaign, np.array(cases, dtype=np.int64))
+    inputs = full_inputs(campaign, table)
+    [changes] = in_threads(lambda flyer: flyer.integration_changes(inputs, noise), [flyer_of(campaign)])
+    return changes
 
 
 def _histories_of(campaign: Campaign, flyer: Flyer, cases: Sequence[int], stopped: Callable[[], bool]) -> list[Columns]:

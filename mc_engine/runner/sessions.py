@@ -9,24 +9,20 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
 
-import numpy as np
-
-from mc_engine.campaign.cases import full_inputs
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.sensitivity_design import DESIGN as PICK_FREEZE
 from mc_engine.campaign.sensitivity_design import companion, sensitivity_record
 from mc_engine.durable_file import remove_file
 from mc_engine.errors import DiskError, RunInterrupted, StoreError, WorkersLost
-from mc_engine.flight.chunks import NOMINAL_TASK, Task, chunk_size, drawn, rerun_tasks
+from mc_engine.flight.chunks import NOMINAL_TASK, Task, chunk_size, rerun_tasks
 from mc_engine.flight.flyer import Flyer
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import in_threads, stop_signal
 from mc_engine.runner.backends import Backend, flyer_on
 from mc_engine.runner.dispatch import Dispatch
 from mc_engine.runner.flown_campaign import companions_of
-from mc_engine.runner.histories import write_histories
+from mc_engine.runner.histories import integration_changes, write_histories
 from mc_engine.runner.manifest import columns_of, manifest_of
 from mc_engine.runner.part_bounds import Stretch, part_bounds, stretches
 from mc_engine.runner.pools import pool_of
@@ -39,11 +35,6 @@ from mc_engine.store.parts import Written, problem_of
 from mc_engine.store.repair import mend_journal, withdraw_damaged
 from mc_engine.store.run_files import JOURNAL, NOMINAL_CASE, SENSITIVITY, is_run_directory
 from mc_engine.store.store import Store, create_store
-
-_MOST_COMPARED, _COMPARED_OF = (
-    16,
-    100,
-)  # cases flown with finer steps too: one of so many, for a time that does not count
 
 
 @dataclass(frozen=True)
@@ -93,7 +84,7 @@ def _fly_missing(store: Store, campaign: Campaign, session: Session, repair: boo
         if not store.notes("companion"):
             store.note("companion")
     times = {"prepare_s": round(begun - begin, 3), "fly_s": round(flown - begun, 3)}
-    store.note("finished", **times, integration=_integration_changes(store, campaign))
+    store.note("finished", **times, integration=integration_changes(store, campaign))
 
 
 @contextmanager
@@ -212,16 +203,6 @@ def _fly_histories(store: Store, campaign: Campaign, session: Session, stopped: 
     whole = len(store.wanted) == store.n_cases
     if whole and not write_histories(store, campaign, session.workers, stopped):
         raise _interrupted(store, " and without the saved time histories")
-
-
-def _integration_changes(store: Store, campaign: Campaign) -> dict[str, Any] | None:
-    """How finer steps change the metrics of the first cases of a run, see `Flyer`; None of a shard or a companion."""
-    if len(store.wanted) < store.n_cases or "sensitivity" in store.manifest:
-        return None
-    table, noise = drawn(campaign, np.arange(min(_MOST_COMPARED, -(-store.n_cases // _COMPARED_OF))))
-    inputs = full_inputs(campaign, table)
-    [changes] = in_threads(lambda flyer: flyer.integration_changes(inputs, noise), [flyer_of(campaign)])
-    return changes
 
 
 def _fly_companion(store: Store, campaign: Campaign, session: Session, repair: bool, stop: threading.Event) -> None:
