@@ -35,7 +35,7 @@ from mc_engine.command_line.app import (
     write_reports,
 )
 from mc_engine.command_line.next_step import MERGE, after_flight, is_complete
-from mc_engine.interruption import advise, raise_if_signalled
+from mc_engine.interruption import NOTHING_BEGUN, advise, raise_if_signalled
 from mc_engine.shell_words import shell_word
 from mc_engine.status import MOST_CASES
 
@@ -92,7 +92,7 @@ def run(
 
         watch_campaign(file, out, context)
         return
-    advise(lambda: after_flight(None))
+    advise(lambda: NOTHING_BEGUN)
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.store.run_files import default_folder
 

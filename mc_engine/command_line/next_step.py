@@ -13,12 +13,12 @@ MERGE = "`mc-engine merge RUN SHARD...` makes one run of all shards, and its rep
 _UNFINISHED = ("created", "started", "rerun", "extended", "part-withdrawn")  # events that `finished` has to follow
 
 
-def after_flight(run: Path | None, options: str = "", url: str | None = None, rerun: bool = False) -> str:
-    """The message for a flight into the directory `run`, or None if that was not chosen yet.
+def after_flight(run: Path, options: str = "", url: str | None = None, rerun: bool = False) -> str:
+    """The message for a flight into the directory `run`.
 
     options : those of the backend.  url : where the run is published.  rerun : the flight was of failed cases.
     """
-    if run is None or not (run / JOURNAL).is_file():
+    if not (run / JOURNAL).is_file():
         return NOTHING_BEGUN
     import json  # not for `--help`
 
@@ -56,8 +56,8 @@ def _is_finished(events: list[str]) -> bool:
     return last.get("finished", -1) > max((last[event] for event in _UNFINISHED if event in last), default=0)
 
 
-def after_search(folder: Path | None, record: str, words: str) -> str:
+def after_search(folder: Path, record: str, words: str) -> str:
     """The message for a search whose result is the file `record` in `folder`.  words : subject of the sentence."""
-    if folder is None or not (folder / record).is_file():
+    if not (folder / record).is_file():
         return NOTHING_BEGUN
     return f"interrupted; {words} in {folder}, `mc-engine report {shell_word(folder)}` writes the report"

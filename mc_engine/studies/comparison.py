@@ -100,7 +100,6 @@ class Comparison:
     ok: tuple[int, int]
     pairing: Pairing
     alpha: float
-    tolerance: float
     confidence: float
     metrics: tuple[MetricChange, ...]
     shares: tuple[ShareChange, ...]
@@ -201,7 +200,6 @@ def compare_runs(
         ok=_both(ok, lambda flown: int(flown.sum())),
         pairing=pairing,
         alpha=alpha,
-        tolerance=tolerance,
         confidence=confidence,
         metrics=tuple(
             replace(change, shift_adjusted=next(adjusted), spread_adjusted=next(adjusted)) for change in changes
