@@ -52,10 +52,6 @@ class Curve(PhysicsFunction):
         super().__init__(function)
         self.block, self.words, self.kind, self.outside = block, words, kind, outside
 
-    def structure(self) -> tuple[str, ...]:
-        """What machine code has of the curve: all but its numbers and how many there are."""
-        return type(self).__name__, self.function.__qualname__, self.kind, self.outside
-
     def __call__(self, *args: Any) -> Any:
         """The value at the argument(s), interpreted: floats or arrays, SI."""
         wanted = self.function.__code__.co_argcount

@@ -187,10 +187,6 @@ class DensityRegion:
         """Closed curves float64[k, 2], those of holes among them."""
         return self.density.outlines(self.level)
 
-    def holds(self, points: np.ndarray) -> np.ndarray:
-        """bool[n]: which of points float64[n, 2] lie inside."""
-        return self.density.at(points) >= self.level
-
 
 def density_regions(
     points: np.ndarray, contents: tuple[float, ...] = CONTENTS, confidence: float = 0.90, thinnest: float = 0.0

@@ -161,14 +161,6 @@ def test_a_surface_has_the_same_edges(outside, kind):
     np.testing.assert_array_equal(found, [middle, *beyond, np.nan, np.nan, np.nan, np.nan])
 
 
-def test_the_structure_has_no_numbers_of_the_points():
-    one, other = curve(x=[0.0, 1.0], y=[0.0, 1.0]), curve(x=[0.0, 3.0, 4.0], y=[0.0, 1.0, 7.0])
-    assert one.structure() == other.structure()
-    kinds = {curve(x=[0, 1], y=[0, 1], kind=k, outside=o).structure() for k in curves.KINDS for o in curves.OUTSIDE}
-    flat = {surface(x=[0, 1], y=[0, 1], z=[[0, 0], [0, 0]], kind=k).structure() for k in curves.KINDS}
-    assert len(kinds | flat) == 12
-
-
 # ---- files
 
 

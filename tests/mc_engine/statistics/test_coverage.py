@@ -167,7 +167,8 @@ def regions_held(n, campaigns):
     held = {}
     for _ in range(campaigns):
         for region in density_regions(cloud(n), (0.5, 0.9), 0.9):
-            held.setdefault(region.content, []).append(region.holds(population).mean() >= region.content)
+            inside = region.density.at(population) >= region.level
+            held.setdefault(region.content, []).append(inside.mean() >= region.content)
     return {content: np.mean(found) for content, found in held.items()}
 
 
