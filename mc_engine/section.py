@@ -28,3 +28,23 @@ class ReportSection(Section):
 
     probability: Share = Field(default=0.9973, ge=0.5, description="of tolerance limits and percentiles")
     confidence: Share = Field(default=0.90, ge=0.5, description="with which each bound holds")
+
+    @property
+    def outer(self) -> tuple[float, float]:
+        """The percentiles between which a case lies with the probability."""
+        return round(0.5 * (1.0 - self.probability), 12), round(0.5 * (1.0 + self.probability), 12)
+
+    @property
+    def low(self) -> float:
+        """The percentile above which a case lies with the probability."""
+        return round(1.0 - self.probability, 12)
+
+    @property
+    def percentiles(self) -> tuple[float, ...]:
+        """All that a report tells, ascending."""
+        return self.outer[0], self.low, 0.5, self.probability, self.outer[1]
+
+    @property
+    def two_sided(self) -> float:
+        """The confidence of an interval whose bounds each hold with the confidence."""
+        return 2.0 * self.confidence - 1.0

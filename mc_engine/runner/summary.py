@@ -81,7 +81,6 @@ def outcomes(store: Store) -> "tuple[list[Verdict], Verdict | None]":
     """The same verdicts without the demonstrated bounds, for which alone the parts are read more than once."""
     import numpy as np
 
-    from mc_engine.statistics import was_looked_at
     from mc_engine.statistics.requirements import LimitCounts, judge_counted
 
     requirements = store.manifest.get("requirements", [])
@@ -90,7 +89,7 @@ def outcomes(store: Store) -> "tuple[list[Verdict], Verdict | None]":
     counts = LimitCounts(requirements)
     for table, numbers in metric_parts(store, _judged_metrics(requirements)):
         counts.add(numbers.__getitem__, np.ones(table.num_rows, dtype=bool))
-    return judge_counted(counts, None, _design(store), was_looked_at(store.manifest, store.n_cases, _flown(store)))
+    return judge_counted(counts, None, _design(store), _looked(store))
 
 
 def _judged_metrics(requirements: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -105,11 +104,15 @@ def _flown(store: Store) -> int:
     return sum(part.rows for part in store.parts)
 
 
-def analyses_line(store: Store) -> str:
-    """How the number of cases was determined, if it was not fixed in advance; else empty."""
+def _looked(store: Store) -> bool:
     from mc_engine.statistics import was_looked_at
 
-    if not was_looked_at(store.manifest, store.n_cases, _flown(store)):
+    return was_looked_at(store.manifest, store.n_cases, _flown(store))
+
+
+def analyses_line(store: Store) -> str:
+    """How the number of cases was determined, if it was not fixed in advance; else empty."""
+    if not _looked(store):
         return ""
     looks = store.manifest.get("looks", [])
     begun = store.manifest["campaign"]["cases"]
@@ -157,9 +160,8 @@ def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, 
     from mc_engine.statistics import CHOSEN_DESIGNS, QUANTILES
 
     stated = ReportSection(**store.manifest.get("report", {}))
-    outer = (round(0.5 * (1.0 + sign * stated.probability), 12) for sign in (-1.0, 1.0))
-    probabilities = () if _design(store) in CHOSEN_DESIGNS else tuple(sorted({*QUANTILES, *outer}))
-    return streamed(store, names, probabilities=probabilities, confidence=2.0 * stated.confidence - 1.0).summaries
+    probabilities = () if _design(store) in CHOSEN_DESIGNS else tuple(sorted({*QUANTILES, *stated.outer}))
+    return streamed(store, names, probabilities=probabilities, confidence=stated.two_sided).summaries
 
 
 def streamed(
@@ -174,7 +176,6 @@ def streamed(
 
     passes : yields the metrics of each part, once for each pass; by default from `metric_parts`.
     """
-    from mc_engine.statistics import was_looked_at
     from mc_engine.statistics.order_statistics import QUANTILES
     from mc_engine.statistics.streaming import stream
 
@@ -183,7 +184,7 @@ def streamed(
         metrics,
         requirements=requirements,
         design=_design(store),
-        looked=was_looked_at(store.manifest, store.n_cases, _flown(store)),
+        looked=_looked(store),
         probabilities=QUANTILES if probabilities is None else probabilities,
         confidence=confidence,
     )

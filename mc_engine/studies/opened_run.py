@@ -25,6 +25,7 @@ from mc_engine.runner.summary import case_line, judgement, summaries, verdict_li
 from mc_engine.shell_words import shell_word
 from mc_engine.status import REFUSED, STATUS_NAME
 from mc_engine.store.opening import open_store
+from mc_engine.store.run_files import NOMINAL_CASE
 from mc_engine.store.store import Store
 from mc_engine.studies.replay_files import history_figure
 from mc_engine.suggestions import hint
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from mc_engine.runner.runner import Replay
     from mc_engine.statistics import Summary, Verdict
 
-NOMINAL = -1  # case_id of the nominal case
 _DIGITS = 6
 
 
@@ -119,14 +119,14 @@ class Run:
     @property
     def nominal(self) -> "Case":
         """The nominal case; StoreError if it has not been flown."""
-        return self.case(NOMINAL)
+        return self.case(NOMINAL_CASE)
 
     def case(self, case_id: int) -> "Case":
         """One case by its number; -1 is the nominal one.  StoreError if it is not there, or no number."""
         if not isinstance(case_id, int | np.integer) or isinstance(case_id, bool):
             raise StoreError(f"{self.path}: case {case_id!r} is not there; cases are whole numbers, from 0 to "
-                             f"{self.store.n_cases - 1}, and {NOMINAL} is the nominal one")  # fmt: skip
-        row = self.store.nominal() if case_id == NOMINAL else self.store.row(case_id)
+                             f"{self.store.n_cases - 1}, and {NOMINAL_CASE} is the nominal one")  # fmt: skip
+        row = self.store.nominal() if case_id == NOMINAL_CASE else self.store.row(case_id)
         if not row:
             resume = f"`mc-engine resume {shell_word(self.path)}`"
             raise StoreError(f"{self.path}: the nominal case is not there; {resume} flies it")
@@ -191,7 +191,7 @@ class Case:
     @property
     def name(self) -> str:
         """Such as "case 17", or "nominal case"."""
-        return "nominal case" if self.case_id == NOMINAL else f"case {self.case_id}"
+        return "nominal case" if self.case_id == NOMINAL_CASE else f"case {self.case_id}"
 
     @property
     def status(self) -> str:
@@ -268,7 +268,7 @@ class Case:
             raise ModelError(f"{self.store.path}: was flown by a simulator, which has no physics to trace")
         if self.status == STATUS_NAME[REFUSED]:
             raise StoreError(f"{self.store.path}: {self.name} never started: {self.reason}")
-        inputs, noise = inputs_of(campaign, None if self.case_id == NOMINAL else self.case_id)
+        inputs, noise = inputs_of(campaign, None if self.case_id == NOMINAL_CASE else self.case_id)
         try:
             trace, end = trace_case(campaign.model, inputs, noise, campaign.seed, seconds)
         except OutOfTime as late:
@@ -288,7 +288,7 @@ class Case:
         """
         from mc_engine.runner.runner import replay  # which loads the compiler
 
-        if self.case_id == NOMINAL:
+        if self.case_id == NOMINAL_CASE:
             raise StoreError(f"{self.store.path}: the nominal case cannot be replayed; cases from 0 on can")
         return replay(self.store.path, self.case_id)
 

@@ -7,11 +7,12 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from mc_engine.section import ReportSection
 from mc_engine.statistics.moments import in_units, near_one
 from mc_engine.statistics.regions import covariance_ellipses, density_regions
 from reports.drawing.marks import Line
 from reports.figures.clouds import outline
-from reports.run.flown import Flown, Stated
+from reports.run.flown import Flown
 from reports.text.numbers import count, given_percent, percent
 
 MIDDLE = 0.5  # the fraction in the inner ellipse
@@ -38,7 +39,7 @@ def cloud_regions(flown: Flown, names: tuple[str, str], x: np.ndarray, y: np.nda
 
 
 def _regions(
-    points: np.ndarray, placed: Callable[[np.ndarray], np.ndarray], ranges: np.ndarray, stated: Stated
+    points: np.ndarray, placed: Callable[[np.ndarray], np.ndarray], ranges: np.ndarray, stated: ReportSection
 ) -> Iterator[Line]:
     """Regions of standardised points.  ranges : float64[2, 2], lowest and highest possible x and y.
 

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from mc_engine.model.figures import KINDS, MapFigure, ScatterFigure, from_record
+from mc_engine.section import ReportSection
 from mc_engine.statistics import CHOSEN_DESIGNS, SAMPLING_DESIGNS, Summary, Verdict, summarize, was_looked_at
 from mc_engine.statistics.first_order import Contributor, contributors
 from mc_engine.statistics.worst import Limits, limits_on
@@ -23,34 +24,6 @@ NEGLIGIBLE = 1e-7  # of the size of a metric
 SQUARABLE = 1e140  # largest number, and inverse of the smallest spread, whose squares over all cases can be summed
 NEGLIGIBLE_SPREAD = "standard deviation below a ten-millionth of the value"
 UNSQUARABLE = "numbers beyond 1e140 or a standard deviation below 1e-140"
-
-
-@dataclass(frozen=True)
-class Stated:
-    """The probability and the confidence of all statistics of a report: [report] of the campaign file."""
-
-    probability: float = 0.9973
-    confidence: float = 0.90
-
-    @property
-    def outer(self) -> tuple[float, float]:
-        """The percentiles between which a case lies with the probability."""
-        return round(0.5 * (1.0 - self.probability), 12), round(0.5 * (1.0 + self.probability), 12)
-
-    @property
-    def low(self) -> float:
-        """The percentile above which a case lies with the probability."""
-        return round(1.0 - self.probability, 12)
-
-    @property
-    def percentiles(self) -> tuple[float, ...]:
-        """All that are told, ascending."""
-        return self.outer[0], self.low, 0.5, self.probability, self.outer[1]
-
-    @property
-    def two_sided(self) -> float:
-        """The confidence of an interval whose bounds each hold with the confidence."""
-        return 2.0 * self.confidence - 1.0
 
 
 @dataclass(frozen=True)
@@ -89,9 +62,9 @@ class Flown:
         return self.manifest.get("campaign", {})
 
     @cached_property
-    def stated(self) -> Stated:
+    def stated(self) -> ReportSection:
         """Probability and confidence of all statistics."""
-        return Stated(**self.manifest.get("report", {}))
+        return ReportSection(**self.manifest.get("report", {}))
 
     @property
     def own(self) -> "Flown":
