@@ -22,8 +22,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
-from functools import partial
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -49,91 +48,50 @@ class TemplateError(EngineError):
 
 
 @dataclass(frozen=True)
-class QuantileFacts:
-    """value of a quantile and its distribution-free limits; None what the cases are too few for."""
-
-    value: float | None
-    lower: float | None
-    upper: float | None
-
-
-@dataclass(frozen=True)
-class MetricFacts:
-    """A metric: unit, n_used of n_tried, nominal, mean, sd, minimum, maximum, and `quantile(0.99865)`."""
-
-    unit: str
-    n_used: int
-    n_tried: int
-    nominal: float | None
-    mean: float | None
-    sd: float | None
-    minimum: float | None
-    maximum: float | None
-    _summary: Callable[[float], Summary] = field(repr=False)
-
-    def quantile(self, probability: float) -> QuantileFacts:
-        """The quantile and its limits, each holding with the report's confidence."""
-        if not 0.0 < probability < 1.0:
-            raise ValueError(f"quantile({probability}): a probability lies between 0 and 1")
-        estimate = self._summary(probability).at(probability)
-        return (
-            QuantileFacts(estimate.value, estimate.lower, estimate.upper)
-            if estimate
-            else QuantileFacts(None, None, None)
-        )
-
-
-@dataclass(frozen=True)
 class RunFacts:
     """A run as a template sees it.
 
-    name, title, design, seed, n_tried, n_ok, n_wanted; metrics, requirements (verdicts: outcome, passed, tried, share,
-    confidence, lower, upper, at_most, at_least, ...), parameters (their values) and inputs (records: unit, nominal,
-    distribution, source, description), each by name.
+    data : by name, as plain data: name, title, design, seed, n_tried, n_ok, n_wanted; metrics (unit, n_used of n_tried,
+        nominal, mean, sd, minimum, maximum), requirements (verdicts: outcome, passed, tried, share, confidence, lower,
+        upper, at_most, at_least, ...), parameters (their values) and inputs (records: unit, nominal, distribution,
+        source, description), each by name.
+    summary : of a metric, by its name and the probability of a quantile.  A template's `quantile(0.99865)` has its
+        value and its distribution-free limits, `lower` and `upper`; None what the cases are too few for.
     """
 
-    name: str
-    title: str
-    design: str
-    seed: Any
-    n_tried: int
-    n_ok: int
-    n_wanted: int
-    metrics: Mapping[str, MetricFacts]
-    requirements: Mapping[str, Any]
-    parameters: Mapping[str, Any]
-    inputs: Mapping[str, Mapping[str, Any]]
+    data: Mapping[str, Any]
+    summary: Callable[[str, float], Summary]
 
 
 def run_facts(flown: Flown, title: str) -> RunFacts:
     """What templates may say of a run."""
     metrics = {
-        name: MetricFacts(
-            unit=flown.unit(name),
-            n_used=summary.n_used,
-            n_tried=summary.n_tried,
-            nominal=flown.nominal_value(name),
-            mean=summary.mean,
-            sd=summary.sd,
-            minimum=summary.minimum,
-            maximum=summary.maximum,
-            _summary=partial(flown.every.summary, name),
-        )
+        name: {
+            "unit": flown.unit(name),
+            "n_used": summary.n_used,
+            "n_tried": summary.n_tried,
+            "nominal": flown.nominal_value(name),
+            "mean": summary.mean,
+            "sd": summary.sd,
+            "minimum": summary.minimum,
+            "maximum": summary.maximum,
+        }
         for name, summary in flown.summaries.items()
     }
-    return RunFacts(
-        name=flown.name,
-        title=title,
-        design=flown.design,
-        seed=flown.campaign.get("seed"),
-        n_tried=flown.n_tried,
-        n_ok=flown.every.completed,
-        n_wanted=flown.n_wanted,
-        metrics=metrics,
-        requirements={verdict.name: verdict for verdict in flown.verdicts},
-        parameters={record["name"]: record.get("value") for record in flown.manifest.get("parameters", [])},
-        inputs={record["name"]: record for record in flown.manifest.get("inputs", [])},
-    )
+    data = {
+        "name": flown.name,
+        "title": title,
+        "design": flown.design,
+        "seed": flown.campaign.get("seed"),
+        "n_tried": flown.n_tried,
+        "n_ok": flown.every.completed,
+        "n_wanted": flown.n_wanted,
+        "metrics": metrics,
+        "requirements": {verdict.name: asdict(verdict) for verdict in flown.verdicts},
+        "parameters": {record["name"]: record.get("value") for record in flown.manifest.get("parameters", [])},
+        "inputs": {record["name"]: record for record in flown.manifest.get("inputs", [])},
+    }
+    return RunFacts(data, flown.every.summary)
 
 
 # ---- filling it in
@@ -171,7 +129,7 @@ def _filled_in(
 ) -> dict[str, Any]:
     """The text that the template comes to, from a process that has bounds; see `template_process`."""
     facts = [run, *runs]
-    request = {"source": source, "run": 0, "runs": [_plain(facts_of_run) for facts_of_run in facts], "known": known}
+    request = {"source": source, "runs": [one.data for one in facts], "known": known}
     # Nothing is imported from the folder of the process, or of the program: -P, and the paths of this one.
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     command = [sys.executable, "-P", "-W", "ignore", template_process.__file__]
@@ -190,8 +148,8 @@ def _filled_in(
                 answer = json.loads(process.stdout.readline())
                 if "quantile" in answer:
                     index, metric, probability = answer["quantile"]
-                    quantile = facts[index].metrics[metric].quantile(probability)
-                    words = json.dumps([quantile.value, quantile.lower, quantile.upper])
+                    found = facts[index].summary(metric, probability).at(probability)
+                    words = json.dumps([found.value, found.lower, found.upper] if found else [None] * 3)
         except (OSError, ValueError):  # its end came before that of the template
             answer = {"fault": f"takes more than {LONGEST_S:.0f} s, or than its memory", "line": None}
         finally:
@@ -201,18 +159,6 @@ def _filled_in(
         place = f"{template}, line {answer['line']}" if answer["line"] else str(template)
         raise TemplateError(f"{place}: {answer['fault']}")
     return answer
-
-
-def _plain(run: RunFacts) -> dict[str, Any]:
-    """The facts as plain data; of a metric all but its other quantiles."""
-    facts = {member.name: getattr(run, member.name) for member in fields(run)}
-    metrics = {name: {key: value for key, value in vars(metric).items() if key != "_summary"}
-               for name, metric in run.metrics.items()}  # fmt: skip
-    return {
-        **facts,
-        "metrics": metrics,
-        "requirements": {name: asdict(verdict) for name, verdict in run.requirements.items()},
-    }
 
 
 def _named(document: Document, kind: type) -> dict[str, Block]:

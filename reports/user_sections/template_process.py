@@ -29,7 +29,10 @@ class _Place(str):
 
 
 class _Runs:
-    """The runs as the template sees them, and the tables and figures that it has placed, in their order."""
+    """The runs as the template sees them, and the tables and figures that it has placed, in their order.
+
+    runs : the run of the report, and after it all of the command.
+    """
 
     def __init__(self, request: dict[str, Any]):
         self.known = request["known"]
@@ -73,7 +76,7 @@ def _filled_in(request: dict[str, Any]) -> dict[str, Any]:
     environment.filters |= {"number": number, "percent": percent, "count": count}
     try:
         runs = _Runs(request)
-        names = {"run": runs.runs[request["run"]], "runs": runs.runs, "table": runs.table, "figure": runs.figure}
+        names = {"run": runs.runs[0], "runs": runs.runs[1:], "table": runs.table, "figure": runs.figure}
         pieces, letters = [], 0
         for piece in environment.from_string(request["source"]).generate(names):
             pieces.append(piece)

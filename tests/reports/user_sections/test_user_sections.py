@@ -11,6 +11,7 @@ from reports import build, render_html, render_pdf
 from reports.document.blocks import FigureBlock, Table, Text, blocks_of
 from reports.formats.markdown import render_markdown
 from reports.run.flown import Flown
+from reports.text.numbers import number
 from reports.user_sections import sections
 from reports.user_sections.sections import run_facts, with_own_sections
 
@@ -31,11 +32,11 @@ def document(run):
 def filled(tmp_path, document, run):
     """The document with the sections of a template text."""
 
-    def fill(text, of=document, facts=None):
+    def fill(text, of=document, facts=None, beside=()):
         file = tmp_path / "own.md"
         file.write_text(text, encoding="utf-8")
         facts = facts or run_facts(Flown(run, "run"), "a title")
-        return with_own_sections(of, file, facts, [facts])
+        return with_own_sections(of, file, facts, [*beside, facts])
 
     return fill
 
@@ -62,7 +63,7 @@ def test_the_example_of_the_documentation_works_in_all_formats(filled, document)
     assert render_pdf(made).startswith(b"%PDF")
 
 
-def test_headings_lists_tables_and_code_become_blocks(filled):
+def test_headings_lists_tables_and_code_become_blocks(filled, run):
     text = """# One
 
 ## Inside
@@ -73,7 +74,7 @@ def test_headings_lists_tables_and_code_become_blocks(filled):
 Table: Loops
 | Run | Largest |
 |---|---:|
-{% for one in runs %}| {{ one.name }} | {{ one.metrics.peak_force_n.maximum }} |
+{% for one in runs %}| {{ one.name }} | {{ one.metrics.peak_force_n.quantile(0.5).value }} |
 {% endfor %}
 
 ```
@@ -84,12 +85,16 @@ mc-engine run
 
 <b>not bold</b>
 """
-    made = filled(text.replace("Table: Loops\n", "Table: Loops\n\n"))
+    other = run_facts(Flown(synthetic_run(100, seed=2), "other"), "another title")
+    made = filled(text.replace("Table: Loops\n", "Table: Loops\n\n"), beside=[other])
     assert [section.title for section in made.sections[:2]] == ["One", "Two"]
     heading, points, table, code, plain = own(made)
     assert (heading.kind, heading.paragraphs) == ("heading", ("Inside",))
     assert points.paragraphs == ("first point", "second, see there (https://example.invalid)")
-    assert (table.caption, table.rows[0][0].text, table.columns[1].kind) == ("Loops", "run", "number")
+    assert (table.caption, [column.kind for column in table.columns]) == ("Loops", ["text", "number"])
+    assert [row[0].text for row in table.rows] == ["other", "run"]  # each run of the command once, in its order
+    medians = [one.summary("peak_force_n", 0.5).at(0.5).value for one in (other, run_facts(Flown(run, "run"), ""))]
+    assert [row[1].text for row in table.rows] == [number(median) for median in medians]
     assert (code.kind, code.paragraphs) == ("code", ("mc-engine run",))
     assert plain.paragraphs == ("<b>not bold</b>",)
 
