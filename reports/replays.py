@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from mc_engine.store.run_files import NOMINAL_CASE
+from mc_engine.studies.replay_files import LARGEST
 from reports.drawing import paper
 from reports.drawing.marks import Drawing
 from reports.drawing.pictures import render_picture
 from reports.figures.histories import HistoryLine, history_figure
 from reports.run.flown import Flown, Run
 from reports.run.phases import quantity_names
-from reports.sections.figure_blocks import NOMINAL, is_constant, saved_histories
-
-LARGEST = 1e100  # of any unit: what a flight that is lost holds beyond it, no axis can have ticks for
+from reports.sections.figure_blocks import is_constant, saved_histories
 
 
 def replay_picture(run: Run, case_id: int, history: pd.DataFrame) -> bytes:
@@ -30,7 +30,7 @@ def replay_drawing(run: Run, case_id: int, history: pd.DataFrame) -> Drawing:
     quantities = {name: np.where(np.abs(columns[name]) < LARGEST, columns[name], np.nan) for name in varying}
     line = HistoryLine(f"case {case_id}", t, quantities, 1)
     held = set(flown.histories["case_id"]) if len(flown.histories) else set()
-    nominal: dict[int, tuple[str, int | None]] = {NOMINAL: ("nominal", 0)} if NOMINAL in held else {}
+    nominal: dict[int, tuple[str, int | None]] = {NOMINAL_CASE: ("nominal", 0)} if NOMINAL_CASE in held else {}
     histories = saved_histories(flown, varying, nominal)
     histories = replace(histories, lines=(*histories.lines, line))
     return history_figure([histories.plot(flown, name) for name in varying])

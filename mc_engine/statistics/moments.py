@@ -4,7 +4,7 @@ First pass (`Tally`): number, smallest, largest and exact sum.  Second pass (`Sp
 the distances from the mean; each power is rounded on its own, which depends on the case alone.
 """
 
-from math import frexp, ldexp, sqrt
+from math import frexp, isfinite, ldexp, sqrt
 
 import numpy as np
 
@@ -19,6 +19,11 @@ def finite_values(values: np.ndarray) -> np.ndarray:
     """The finite ones of float64[n], with -0.0 as 0.0, which it equals."""
     finite = np.isfinite(values)
     return (values if finite.all() else values[finite]) + 0.0
+
+
+def number_or_none(value: float | None) -> float | None:
+    """None for what is no finite number."""
+    return float(value) if value is not None and isfinite(value) else None
 
 
 def near_one(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

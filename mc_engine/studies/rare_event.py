@@ -5,7 +5,6 @@ or `statistics.importance_sampling`.  The same campaign, method, settings and se
 threads.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -19,6 +18,7 @@ from mc_engine.errors import CampaignError, Problem, RunInterrupted
 from mc_engine.interruption import stop_signal
 from mc_engine.runner.manifest import manifest_of
 from mc_engine.statistics.importance_sampling import cross_entropy
+from mc_engine.statistics.moments import number_or_none
 from mc_engine.statistics.rare_events import RareEvent
 from mc_engine.statistics.subset_simulation import subset_simulation
 from mc_engine.store.parts import Column
@@ -125,12 +125,14 @@ def _result_record(limit: LimitState, estimate: RareEvent) -> dict[str, Any]:
         "lower": estimate.lower,
         "upper": estimate.upper,
         "confidence": estimate.confidence,
-        "relative_error": _finite(estimate.relative_error),
-        "plain_cases": _finite(estimate.plain_cases),
+        "relative_error": number_or_none(estimate.relative_error),
+        "plain_cases": number_or_none(estimate.plain_cases),
         "cases": estimate.n_cases,
         "failed": int(estimate.cases.failed.sum()),
         "no_number": int(np.isneginf(estimate.cases.margin).sum()),
-        "levels": [{**asdict(level), "margin": _finite(float(_distance(level.margin)))} for level in estimate.levels],
+        "levels": [
+            {**asdict(level), "margin": number_or_none(float(_distance(level.margin)))} for level in estimate.levels
+        ],
         "inputs": inputs,
         "remarks": [*estimate.remarks, *remark],
     }
@@ -176,7 +178,3 @@ def _failed_inputs(limit: LimitState, estimate: RareEvent) -> tuple[list[dict[st
 def _distance(margin: np.ndarray | float) -> np.ndarray:
     """Margins as distances: that of a case right at its limit, which is inside, is 0."""
     return np.where(np.equal(margin, AT_LIMIT), 0.0, margin)
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -19,7 +19,7 @@ from mc_engine.text import clean
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_LARGEST = 1e100  # of any unit; what a flight that is lost holds beyond it, no axis can have ticks for
+LARGEST = 1e100  # of any unit; what a flight that is lost holds beyond it, no axis can have ticks for
 
 
 def write_replay(store: Store, case_id: int, history: pd.DataFrame, picture: bytes) -> list[Path]:
@@ -68,7 +68,7 @@ def history_figure(history: pd.DataFrame, quantities: Sequence[Mapping[str, str]
     figure = Figure(figsize=(10.0, 1.0 + 1.8 * rows), layout="constrained")
     axes = figure.subplots(rows, 2, sharex=True, squeeze=False)
     for axis, column in zip(axes.flat, columns, strict=False):
-        drawn = history[column.name].where(history[column.name].abs() < _LARGEST)
+        drawn = history[column.name].where(history[column.name].abs() < LARGEST)
         axis.plot(history["t_s"], drawn, linewidth=0.9)
         label = clean(f"{column.name} [{column.unit}]" if column.unit else column.name)
         axis.set_ylabel(label, fontsize="small", parse_math=False)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from mc_engine.statistics.moments import number_or_none
 from mc_engine.statistics.sensitivity import FEWEST_CASES, FEWEST_OF_TOTALS, Sensitivity, beyond_chance
 from reports.contributors.tornado_figure import STRONGEST, contributor_figure, name_of, strongest
 from reports.document.blocks import Cell, Column, FigureBlock, Table
@@ -118,11 +119,9 @@ def _sigma_cell(flown: Flown, metric: str, contributor: Contributor) -> Cell:
 def _trends(sensitivity: Sensitivity, name: str, k: int) -> list[Cell]:
     if name not in sensitivity.inputs:
         return [Cell("–") for _ in _TRENDS]
-    return [_cell(_finite(getattr(sensitivity, trend)[sensitivity.inputs.index(name), k]), None) for trend in _TRENDS]
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    return [
+        _cell(number_or_none(getattr(sensitivity, trend)[sensitivity.inputs.index(name), k]), None) for trend in _TRENDS
+    ]
 
 
 def _note(flown: Flown, contributions: Contributions, shown: list[str]) -> str:

@@ -87,19 +87,11 @@ def _index_table(
         for row in np.argsort(-effects, kind="stable")[:MOST_INPUTS]:
             cells = [_cell(designed.values[index][row, k], designed.reach[index][row, k], least) for index in indices]
             rows.append((metric, Cell(flown.words(designed.inputs[row])), *cells))
+    confidence = given_percent(flown.stated.confidence)
     if designed.design == "saltelli":
-        return Table(
-            "Sobol’ indices of Saltelli’s blocks",
-            columns,
-            tuple(rows),
-            _saltelli_note(designed, given_percent(flown.stated.confidence)),
-        )
-    return Table(
-        "Elementary effects of Morris’s trajectories",
-        columns,
-        tuple(rows),
-        _morris_note(given_percent(flown.stated.confidence)),
-    )
+        note = _saltelli_note(designed, confidence)
+        return Table("Sobol’ indices of Saltelli’s blocks", columns, tuple(rows), note)
+    return Table("Elementary effects of Morris’s trajectories", columns, tuple(rows), _morris_note(confidence))
 
 
 def _cell(value: float, reach: float, least: float) -> Cell:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.statistics.drivers import FALSE_DISCOVERIES, FEWEST, Driver, failure_drivers, success_along
+from mc_engine.statistics.drivers import FALSE_DISCOVERIES, FEWEST, Driver, Drivers, failure_drivers, success_along
 from reports.contributors.companion import companion_blocks, no_contributors
 from reports.contributors.designed_indices import designed_blocks
 from reports.document.blocks import Cell, Column, FigureBlock, Table
@@ -57,16 +57,8 @@ def _driver_blocks(
     flown: Flown, inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray]
 ) -> Iterator[FigureBlock | Table | str]:
     drivers = failure_drivers(inputs, failed)
-    told = [*drivers.singles, *drivers.pairs]
-    if told:
-        yield _driver_table(
-            flown,
-            drivers.singles,
-            drivers.pairs,
-            failed,
-            drivers.singles_tested,
-            drivers.pairs_tested,
-        )
+    if drivers.singles or drivers.pairs:
+        yield _driver_table(flown, drivers, failed)
     elif drivers.singles_tested:
         yield (
             f"No input, and no pair of inputs, separates failed from passed cases beyond chance "
@@ -82,14 +74,7 @@ def _driver_blocks(
         yield _success_figure(flown, drivers.singles[:MOST_PANELS], inputs, failed)
 
 
-def _driver_table(
-    flown: Flown,
-    singles: tuple[Driver, ...],
-    pairs: tuple[Driver, ...],
-    failed: Mapping[str, np.ndarray],
-    singles_tested: int,
-    pairs_tested: int,
-) -> Table:
+def _driver_table(flown: Flown, drivers: Drivers, failed: Mapping[str, np.ndarray]) -> Table:
     columns = (
         Column("Requirement", "text", grouped=True),
         Column("Contributor", "text"),
@@ -98,14 +83,15 @@ def _driver_table(
         Column("Adjusted p", "number"),
         Column("Failed in that cell", "number"),
     )
-    told = [*singles[:MOST_DRIVERS], *pairs[:MOST_DRIVERS]]
+    told = [*drivers.singles[:MOST_DRIVERS], *drivers.pairs[:MOST_DRIVERS]]
     rows = tuple(_driver_row(flown, driver, failed) for driver in told)
-    left_out = len(singles) + len(pairs) - len(told)
+    left_out = len(drivers.singles) + len(drivers.pairs) - len(told)
     note = (
-        f"{count(singles_tested)} tests of single inputs and {count(pairs_tested)} of pairs; false-discovery rate of "
-        f"each kind at most {percent(FALSE_DISCOVERIES)} (Benjamini–Hochberg). Separation: Cliff’s delta, 1 if all "
-        "failed cases are separated from all passed ones, 0 if none. A pair is listed if it separates better than "
-        "each of its inputs; its cell is made of outer thirds. Inputs correlated with a contributor are listed too."
+        f"{count(drivers.singles_tested)} tests of single inputs and {count(drivers.pairs_tested)} of pairs; "
+        f"false-discovery rate of each kind at most {percent(FALSE_DISCOVERIES)} (Benjamini–Hochberg). "
+        "Separation: Cliff’s delta, 1 if all failed cases are separated from all passed ones, 0 if none. A pair is "
+        "listed if it separates better than each of its inputs; its cell is made of outer thirds. Inputs "
+        "correlated with a contributor are listed too."
     )
     if left_out:
         note += f" {count(left_out)} weaker ones are not shown."

@@ -151,7 +151,7 @@ class Attachment:
 class Document:
     """The whole report.  created: ISO date and time, UTC, of the run (not of the report); kind: what stands above.
 
-    data : the numbers of a run's report for programs, by the fields of `data.ReportRecord`.
+    data : the numbers of a run's report for programs, by the fields of `formats.json_data.ReportRecord`.
     """
 
     title: str

@@ -5,12 +5,14 @@ they are printed; all else is for programs.
 """
 
 import json
+from dataclasses import asdict
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from mc_engine.statistics import Summary, Verdict
+from mc_engine.statistics.moments import number_or_none
 from mc_engine.statistics.worst import Limits
 from reports.document.blocks import Document, FigureBlock, Table, Terms, Text
 from reports.run.flown import Flown
@@ -176,7 +178,6 @@ def schema() -> dict[str, Any]:
 
 def render_json(document: Document) -> bytes:
     """The file, UTF-8."""
-    numbers = document.data or {}
     record = ReportRecord(
         title=document.title,
         summary=document.subtitle,
@@ -186,7 +187,7 @@ def render_json(document: Document) -> bytes:
             SectionRecord(title=section.title, blocks=[_block_record(block) for block in section.blocks])
             for section in document.sections
         ],
-        **numbers,
+        **document.data,
     )
     return (json.dumps(record.model_dump(), indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
@@ -201,7 +202,9 @@ def run_data(flown: Flown) -> dict[str, Any]:
         "requirements": [_requirement_record(flown, verdict) for verdict in flown.verdicts],
         "joint": None if flown.joint is None else _requirement_record(flown, flown.joint),
         "metrics": [_metric_record(flown, name, summary) for name, summary in flown.summaries.items()],
-        "contributors": [] if contributions is None else [_contributor_record(row) for row in contributions.rows()],
+        "contributors": []
+        if contributions is None
+        else [ContributorRecord(**asdict(row)) for row in contributions.rows()],
         "contributor_flights": 0 if contributions is None else contributions.flights,
         "worst": [record for verdict in flown.verdicts for record in _worst_records(flown, verdict)],
     }
@@ -226,9 +229,9 @@ def _requirement_record(flown: Flown, verdict: Verdict) -> RequirementRecord:
         without_number=verdict.no_number,
         observed_probability=verdict.estimate if verdict.random else None,
         demonstrated_probability=verdict.lower,
-        demonstrated=_finite(verdict.demonstrated),
+        demonstrated=number_or_none(verdict.demonstrated),
         enclosed=verdict.enclosed,
-        margin=_finite(verdict.margin),
+        margin=number_or_none(verdict.margin),
         verdict=verdict.outcome,
         bounds=_bounds(verdict),
         failing=list(verdict.failing),
@@ -250,30 +253,12 @@ def _metric_record(flown: Flown, name: str, summary: Summary) -> MetricRecord:
         n_used=summary.n_used,
         n_tried=summary.n_tried,
         nominal=flown.nominal_value(name),
-        mean=_finite(summary.mean),
-        sigma=_finite(summary.sd),
+        mean=number_or_none(summary.mean),
+        sigma=number_or_none(summary.sd),
         minimum=summary.minimum,
         maximum=summary.maximum,
         integration_change=flown.integration.get("changes", {}).get(name),
-        quantiles=[
-            QuantileRecord(
-                probability=quantile.probability, value=quantile.value, lower=quantile.lower, upper=quantile.upper
-            )
-            for quantile in summary.quantiles
-        ],
-    )
-
-
-def _contributor_record(contributor: Any) -> ContributorRecord:
-    return ContributorRecord(
-        metric=contributor.metric,
-        input=contributor.input,
-        first=contributor.first,
-        total=contributor.total,
-        first_interval=contributor.first_interval,
-        total_interval=contributor.total_interval,
-        fall=contributor.fall,
-        fall_interval=contributor.fall_interval,
+        quantiles=[QuantileRecord(**asdict(quantile)) for quantile in summary.quantiles],
     )
 
 
@@ -286,10 +271,6 @@ def _worst_records(flown: Flown, verdict: Verdict) -> list[WorstRecord]:
         WorstRecord(requirement=verdict.name, case_id=int(case), value=float(value), margin=float(margin))
         for case, value, margin in zip(worst["case_id"], values, margins, strict=True)
     ]
-
-
-def _finite(value: float | None) -> float | None:
-    return float(value) if value is not None and np.isfinite(value) else None
 
 
 def _block_record(block: Any) -> TextRecord:

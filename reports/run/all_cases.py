@@ -19,7 +19,6 @@ import pyarrow.compute as pc
 
 from mc_engine.runner.summary import metric_parts, streamed
 from mc_engine.statistics import Summary, Verdict, judge_all, summarize, was_looked_at, worst_cases
-from mc_engine.statistics.order_statistics import QUANTILES
 from mc_engine.statistics.requirements import LimitCounts
 from mc_engine.statistics.worst import Limits, WorstSoFar, limits_on
 from mc_engine.status import OK, STATUS_NAME
@@ -42,7 +41,7 @@ class Run(Protocol):
     def histories(self) -> pd.DataFrame: ...
 
 
-def all_cases(run: Run, confidence: float, probabilities: tuple[float, ...] = QUANTILES) -> "HeldCases":
+def all_cases(run: Run, confidence: float, probabilities: tuple[float, ...]) -> "HeldCases":
     """The cases of a run, held or streamed.  probabilities, confidence : of the summaries' quantiles."""
     if isinstance(run, Store) and sum(part.rows for part in run.parts) * len(run.columns) > MOST_CELLS:
         return StreamedCases(run, confidence, probabilities)

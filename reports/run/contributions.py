@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy  # loads its packages when they are used
 
+from mc_engine.statistics.moments import number_or_none
 from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
 from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, sensitivity
 from mc_engine.store.opening import open_store
@@ -154,7 +155,7 @@ def _of_table(flown: "Flown", metrics: list[str]) -> Contributions | None:
     shares = ((indices.first_order, indices.first_order_error), (indices.total, indices.total_error))
     by_metric = {}
     for k, metric in enumerate(metrics):
-        left = _number(indices.unexplained[k])
+        left = number_or_none(indices.unexplained[k])
         ranked = _ranked(
             flown,
             metric,
@@ -199,11 +200,7 @@ def _inside(value: float, reach: float, low: float, high: float) -> tuple[float 
     Chance puts estimates beyond the range of what they estimate.  The interval holds the true value wherever that about
     the estimate itself does.
     """
-    nearest = _number(float(np.clip(value, low, high)))
+    nearest = number_or_none(float(np.clip(value, low, high)))
     if nearest is None or not np.isfinite(reach):
         return nearest, None
     return nearest, (max(nearest - reach, low), min(nearest + reach, high))
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -13,12 +13,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from mc_engine.statistics import Verdict
+from mc_engine.store.run_files import NOMINAL_CASE
 from reports.drawing.marks import Limit
 from reports.figures.histories import required_limit
 from reports.run.flown import Flown
 from reports.text.numbers import limit_number, with_unit
 
-NOMINAL = -1
 FEWEST = 3  # saved cases that bear it out
 APART = 0.01  # of the range of a history
 
@@ -66,7 +66,7 @@ def _saved(flown: Flown, metric: str, quantity: str) -> list[tuple[float, np.nda
 def _histories_of(flown: Flown, metric: str, quantity: str) -> Iterator[tuple[float, np.ndarray]]:
     values = dict(zip(flown.case_ids.tolist(), flown.values(metric).tolist(), strict=True))
     nominal = flown.nominal_value(metric)
-    values |= {} if nominal is None else {NOMINAL: nominal}
+    values |= {} if nominal is None else {NOMINAL_CASE: nominal}
     table = flown.histories[["case_id", "t_s", quantity]].sort_values(["case_id", "t_s"], kind="stable")
     cases, first = np.unique(table["case_id"].to_numpy(), return_index=True)
     histories = np.split(table[quantity].to_numpy(dtype=np.float64), first[1:])

@@ -3,10 +3,9 @@
 import pandas as pd
 
 from mc_engine.store.histories import PHASE_COLUMN
+from mc_engine.store.run_files import NOMINAL_CASE
 from reports.run.flown import Flown
 from reports.text.numbers import number, with_unit
-
-NOMINAL = -1
 
 
 def quantity_names(histories: pd.DataFrame) -> list[str]:
@@ -20,7 +19,7 @@ def phase_times(flown: Flown) -> list[tuple[str, float]]:
     histories = flown.histories
     if PHASE_COLUMN not in histories or pd.api.types.is_numeric_dtype(histories[PHASE_COLUMN]):
         return []
-    rows = histories[histories["case_id"] == NOMINAL].sort_values("t_s", kind="stable")
+    rows = histories[histories["case_id"] == NOMINAL_CASE].sort_values("t_s", kind="stable")
     begins = rows[rows[PHASE_COLUMN] != rows[PHASE_COLUMN].shift()]
     return list(zip(begins[PHASE_COLUMN].astype(str), begins["t_s"].astype(float), strict=True))
 

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from mc_engine.statistics.first_order import Contributor, contributors
+from mc_engine.statistics.moments import number_or_none
 from mc_engine.statistics.worst import Limits
 from reports.document.blocks import Cell, Column, Table
 from reports.run.flown import ColumnFacts, Flown
@@ -40,10 +41,6 @@ def case_table(flown: Flown) -> Table | None:
     ]
     rows = tuple(zip(*cells, strict=True))
     return Table("Case by case", columns, rows, "Inputs that are the same in all cases are listed under Inputs.")
-
-
-def _sortable(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def varying_inputs(flown: Flown) -> list[ColumnFacts]:
@@ -134,4 +131,4 @@ def _input_cells(column: pd.Series) -> list[Cell]:
 
 def _number_cells(values: np.ndarray) -> list[Cell]:
     texts = column_texts(values.tolist())
-    return [Cell(text, _sortable(value)) for text, value in zip(texts, values.tolist(), strict=True)]
+    return [Cell(text, number_or_none(value)) for text, value in zip(texts, values.tolist(), strict=True)]

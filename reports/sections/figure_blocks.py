@@ -8,6 +8,7 @@ import numpy as np
 
 from mc_engine.model.figures import ScatterFigure
 from mc_engine.statistics.summary import nearly_equal
+from mc_engine.store.run_files import NOMINAL_CASE
 from reports.document.blocks import FigureBlock
 from reports.drawing.marks import Drawing, Limit, Line, Plot, Points, nominal_ring
 from reports.drawing.palette import VERMILION
@@ -34,7 +35,6 @@ COLOURED_OVER_BANDS = 2  # more would hide the band
 WORST_RANKS = 10
 HISTORIES_SHOWN = 40
 FEWEST_VALUES = 10  # of a histogram
-NOMINAL = -1
 
 
 def thinned_rows(rows: np.ndarray, always: np.ndarray, most: int = POINTS_SHOWN) -> np.ndarray:
@@ -293,7 +293,7 @@ def history_cases(flown: Flown) -> dict[int, tuple[str, int | None]]:
     coloured = {case: rank for rank, case in enumerate(ordered[:COLOURED_CASES], start=1)}
     named: dict[int, tuple[str, int | None]] = {}
     for case in kept:
-        if case == NOMINAL:
+        if case == NOMINAL_CASE:
             named[case] = ("nominal", 0)
         elif case in coloured:
             named[case] = (f"case {case}: {reasons[case][1]}".removesuffix(": "), coloured[case])

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from mc_engine.store.run_files import NOMINAL_CASE
 from mc_engine.studies.replay_files import read_replay, replayed_cases
 from reports.document.blocks import Block, CaseColumn, CaseData, FigureBlock, Section
 from reports.figures.histories import thinned
@@ -21,7 +22,6 @@ from reports.sections.figure_blocks import is_constant, outcome_scatter, thinned
 from reports.text.numbers import axis_label
 
 ANCHOR = "cases"
-NOMINAL = -1
 BINS = 10
 MOST_CASES = 6000  # drawn, and held where a page cannot hold all
 MOST_NUMBERS = 400_000  # of the cases, 4 bytes each
@@ -166,7 +166,7 @@ def case_histories(flown: Flown) -> tuple[dict[int, dict[str, tuple[Any, Any]]],
         return {}, 0
     names = quantity_names(table)
     frames = {int(case): frame for case, frame in table.groupby("case_id", sort=True)}
-    ordered = [case for case in dict.fromkeys([NOMINAL, *_first_of_all(flown), *frames]) if case in frames]
+    ordered = [case for case in dict.fromkeys([NOMINAL_CASE, *_first_of_all(flown), *frames]) if case in frames]
     most = max(1, MOST_SAMPLES // (2 * SAMPLES * max(1, len(names))))
     chosen = {case: _curves(frames[case], names) for case in ordered[:most]}
     return chosen, len(ordered) - len(chosen)

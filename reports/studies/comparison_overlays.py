@@ -6,6 +6,7 @@ import numpy as np
 
 from mc_engine.model.figures import FootprintFigure, HistoryFigure
 from mc_engine.statistics.geodesy import ELLIPSOIDS, WGS84, middle_plane
+from mc_engine.store.run_files import NOMINAL_CASE
 from reports.document.blocks import FigureBlock
 from reports.drawing.marks import Axis, Band, Drawing, Line, Plot, Points, between, to_scale
 from reports.drawing.palette import BLUE, VERMILION
@@ -98,7 +99,7 @@ def _history_marks(run: int, flown: Flown, name: str, band: Envelope | None) -> 
         yield between(band.at, band.curves[0.0], band.curves[1.0], COLOURS[run], 0.2, key=key)
         yield _line(run, band.at, band.curves[0.5], "median")
         return
-    rows = flown.histories[flown.histories["case_id"] == -1].sort_values("t_s", kind="stable")
+    rows = flown.histories[flown.histories["case_id"] == NOMINAL_CASE].sort_values("t_s", kind="stable")
     if len(rows):
         yield _line(run, rows["t_s"].to_numpy(np.float64), rows[name].to_numpy(np.float64), "nominal")
 
