@@ -3,11 +3,10 @@
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from mc_engine.store.store import Store
 from reports.document.blocks import Cell, Column, Table
 from reports.run.flown import Flown
 from reports.text.numbers import count, exact, number, with_unit, words
-
-TIMED_EVENTS = ("timing", "finished")
 
 
 def provenance_table(flown: Flown) -> Table:
@@ -15,7 +14,7 @@ def provenance_table(flown: Flown) -> Table:
     campaign = flown.campaign
     cases = f"{count(flown.n_tried)} / {count(flown.n_wanted)}"
     own = [("design", flown.design), ("seed", campaign.get("seed", "")), ("cases flown / required", cases)]
-    return origin_table("run", flown.name, flown.manifest, own, timing_facts(flown))
+    return origin_table("run", flown.name, flown.manifest, own, _timing_facts(flown))
 
 
 def origin_table(
@@ -58,23 +57,13 @@ def git_text(git: Mapping[str, Any] | None) -> str:
     return f"{git.get('commit', '')}{', with uncommitted changes' if git.get('dirty') else ''}"
 
 
-def timing_facts(flown: Flown) -> Iterator[tuple[str, str]]:
-    """Times from the manifest and from the journal's notes on timing, the later ones last."""
-    notes = getattr(flown.run, "notes", None)
-    entries = notes() if callable(notes) else []
-    facts: dict[str, Any] = dict(manifest_timing(flown.manifest.get("timing")))
-    for entry in entries:
-        if entry.event in TIMED_EVENTS:
-            facts.update(manifest_timing(entry.facts))
+def _timing_facts(flown: Flown) -> Iterator[tuple[str, str]]:
+    """The numbers among the journal's notes on finished runs; the later ones count."""
+    facts: dict[str, float] = {}
+    for entry in flown.run.notes("finished") if isinstance(flown.run, Store) else []:
+        facts |= {name: float(value) for name, value in entry.facts.items() if type(value) in (int, float)}
     for name, value in facts.items():
         yield f"timing: {words(name, 's')}", with_unit(number(value, 4), "s" if name.endswith("_s") else "")
-
-
-def manifest_timing(record: Any) -> dict[str, float]:
-    """The numbers among the facts of a note."""
-    if not isinstance(record, Mapping):
-        return {}
-    return {str(key): float(value) for key, value in record.items() if type(value) in (int, float)}
 
 
 def campaign_facts(flown: Flown) -> tuple[tuple[str, str], ...]:

@@ -213,7 +213,6 @@ def manifest(**changes: Any) -> dict[str, Any]:
             "llvm": "20.1",
             "git": {"commit": "0123456789abcdef0123456789abcdef01234567", "dirty": True},
         },
-        "timing": {"compile_s": 8.25, "fly_s": 3.5},
         **changes,
     }
 
