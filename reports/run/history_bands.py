@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from reports.figures.histories import Envelope
+from reports.run.flown import Flown
 
 FEWEST_CASES = 20  # of a band
 INSTANTS = 150
@@ -24,12 +25,12 @@ def envelope_probabilities(n_cases: int) -> tuple[float, ...]:
     return (0.0, outer, 0.5, 1.0 - outer, 1.0)
 
 
-def fair_cases(case_ids: Sequence[int]) -> list[int]:
-    """Of the cases with a saved history those that stand for all: 0, 1, 2, ... up to the first gap.
+def fair_cases(flown: Flown) -> list[int]:
+    """Of the cases with a saved history those that stand for all: 0, 1, 2, ... up to the first gap; none of a design.
 
     A case further on may have been kept because it is one of the worst; a band over such cases would be too wide.
     """
-    kept = sorted(case for case in case_ids if case >= 0)
+    kept = sorted(case for case in flown.histories["case_id"].unique().tolist() if case >= 0 and flown.random)
     return [case for place, case in enumerate(kept) if case == place]
 
 

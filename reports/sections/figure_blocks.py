@@ -247,7 +247,7 @@ def saved_histories(
     """Of these quantities; cases : name and rank of the lines, by default those worth a line."""
     if not len(flown.histories):
         return SavedHistories((), {}, {})
-    fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
+    fair = fair_cases(flown)
     envelopes = history_envelopes(flown.histories, fair, names)
     if cases is None:
         cases = {

@@ -32,7 +32,7 @@ def _profile_block(flown: Flown, figure: ProfileFigure) -> FigureBlock | str:
         return f"{figure.title}: not drawn; the histories have no output {missing[0]}."
     if not np.isfinite(flown.histories[names].to_numpy(dtype=np.float64)).all(axis=1).any():
         return f"{figure.title}: not drawn; no saved case has both {flown.words(names[0])} and {flown.words(names[1])}."
-    fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
+    fair = fair_cases(flown)
     bands_or_reason = profile_bands(flown.histories, fair, figure.x, figure.y)
     bands = bands_or_reason if isinstance(bands_or_reason, tuple) else ()
     lines = tuple(

@@ -88,7 +88,7 @@ def _histories(runs: tuple[Flown, Flown]) -> Iterator[tuple[str, Plot | None]]:
 
 def _band(flown: Flown, name: str) -> Envelope | None:
     """The envelope of the first cases; None where too few are saved."""
-    fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
+    fair = fair_cases(flown)
     return history_envelopes(flown.histories, fair, [name]).get(name)
 
 

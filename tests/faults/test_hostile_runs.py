@@ -8,6 +8,7 @@ import sys
 
 import pytest
 from stones import call, results, stones
+from trapped import files_of
 
 from mc_engine import open_store
 from mc_engine.runner import runner
@@ -128,19 +129,14 @@ def test_verify_does_not_promise_a_repair_where_the_campaign_itself_is_damaged(r
     assert "--repair" not in done.stderr
 
 
-def bytes_of(run):
-    paths = [*(run / "cases").iterdir(), *(run / "history").iterdir(), run / "nominal.parquet"]
-    return {path.relative_to(run).as_posix(): path.read_bytes() for path in paths}
-
-
 def assert_repaired_in_place(run, lost):
     """What is gone is flown again under its name to its bytes; nothing else is touched."""
-    before = bytes_of(run)
+    before = files_of(run)
     stamps = {file: (run / file).stat().st_mtime_ns for file in before}
     for file in lost:
         (run / file).unlink()
     runner.resume(run, workers=2, repair=True)
-    assert bytes_of(run) == before
+    assert files_of(run) == before
     assert {file for file in before if (run / file).stat().st_mtime_ns != stamps[file]} == set(lost)
     assert damage(run) == []
 
