@@ -119,7 +119,8 @@ def _extreme(kind: str, source: str, output: str, description: str, smooth: bool
 
 
 def last_above(output: str, level: float, description: str = "", **options: Any) -> Metric:
-    """The last time at which an output was above `level`.
+    """The last time at which an output was above `level`: 0 where it never was, and where it still is at the end, the
+    time of the end, which a limit such as that of a settling time must lie below.
 
     output, description, options : as of `maximum_of`
     level : float, in SI
