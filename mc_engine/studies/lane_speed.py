@@ -7,6 +7,7 @@ time of each counts, so that other work on the machine has little influence.
 other method is tried, on a fixed grid from long steps to short ones, or from rough tolerances to fine ones, until its
 error is no larger than the model's own.  The error is the largest difference of a metric from a reference flight, in
 any case, as a fraction of that metric's largest magnitude.  The reference is flown by DOP853 to a tolerance of 1e-13.
+The metric that has it is named: one that is only rounding, such as the altitude at the ground, has an error near 1.
 Samples of the control stay where they are: a model with `control` is tried with whole numbers of steps between them.
 """
 
@@ -134,11 +135,15 @@ def _shortest(callers: list[Callable[[], tuple[float, float]]], repeats: int) ->
 
 @dataclass(frozen=True)
 class MethodTiming:
-    """A method at the error of the model's own.  case_s : shortest time of a case [s]"""
+    """A method at the error of the model's own.
+
+    case_s : shortest time of a case [s];  metric : of the model's own, the one that has this error
+    """
 
     clock: Clock
     error: float
     case_s: float
+    metric: str = ""
 
     @property
     def setting(self) -> str:
@@ -166,7 +171,8 @@ def compare_methods(campaign: Campaign, n_cases: int | None, repeats: int) -> li
     if not isinstance(few.model.clock, FixedStep):
         raise ModelError("methods are compared for models on a fixed grid, FixedStep; this one chooses its steps")
     trials = _Trials(few)
-    known: list[tuple[Clock, float]] = [(trials.own, trials.error(trials.own))]
+    error, metric = trials.largest_error(trials.own)
+    known: list[tuple[Clock, float]] = [(trials.own, error)]
     if not np.isfinite(known[0][1]):
         raise ModelError("methods are not compared: by the model's own, cases end otherwise than by small steps")
     for clocks in trials.ladders():
@@ -176,7 +182,7 @@ def compare_methods(campaign: Campaign, n_cases: int | None, repeats: int) -> li
     models = [replace(timed, model=replace(timed.model, clock=clock)) for clock, _ in known]
     times = _shortest([caller(cases, usual_width(timed.model)) for cases in models], repeats + 1)
     own, *others = [MethodTiming(*method, case_s) for method, (case_s, _) in zip(known, times, strict=True)]
-    return [own, *sorted(others, key=lambda timing: timing.case_s)]
+    return [replace(own, metric=metric), *sorted(others, key=lambda timing: timing.case_s)]
 
 
 def _first_within(trials: "_Trials", clocks: Iterator[Clock], most: float) -> tuple[Clock, float] | None:
@@ -243,14 +249,18 @@ class _Trials:
 
     def error(self, clock: Clock) -> float:
         """Largest relative difference of a metric from the reference; infinite where another case fails."""
+        return self.largest_error(clock)[0]
+
+    def largest_error(self, clock: Clock) -> tuple[float, str]:
+        """The error, and the metric that has it."""
         flown = self._flown(clock)
         if list(flown["status"]) != list(self._true["status"]):
-            return np.inf
-        worst = 0.0
+            return np.inf, ""
+        worst = 0.0, ""
         for metric in self.cases.model.metrics:
             value, true = flown[metric.name], self._true[metric.name]
             if (np.isnan(value) != np.isnan(true)).any():
-                return np.inf
+                return np.inf, metric.name
             size = np.nanmax(abs(true), initial=0.0) or 1.0
-            worst = max(worst, float(np.nanmax(abs(value - true), initial=0.0) / size))
+            worst = max(worst, (float(np.nanmax(abs(value - true), initial=0.0) / size), metric.name))
         return worst

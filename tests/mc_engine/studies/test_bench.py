@@ -88,6 +88,56 @@ def test_methods_are_compared_at_the_error_of_the_models_own(minimal):
         assert error <= 1.05 * own.error
 
 
+FALL = """
+from mc_engine.lanes import physics
+from mc_engine.model import Event, FixedStep, Parameter, at_end, inputs, metrics, model, outputs, states
+
+Inputs = inputs(height_m=Parameter(100.0, "height of the start"))
+State = states(h_m="height", v_m_s="speed upwards")
+Outputs = outputs(height_m="height", speed_m_s="speed upwards")
+Metrics = metrics(ground_m=at_end("height_m", "height at the ground"), impact_m_s=at_end("speed_m_s", "speed there"))
+
+@physics
+def initial(p):
+    return State(h=p.height, v=0.0)
+
+@physics
+def rhs(s):
+    return State(h=s.v, v=-9.8 + 0.01 * s.v * s.v)
+
+@physics
+def height(s):
+    return s.h
+
+@physics
+def observe(s):
+    return Outputs(height=s.h, speed=s.v)
+
+MODEL = model(name="fall", title="A fall", inputs=Inputs, states=State, outputs=Outputs, metrics=Metrics,
+              clock=FixedStep(step=0.1, until=100.0), initial=initial, rhs=rhs, observe=observe,
+              events={"ground": Event(height, "falling", "stop")})
+"""
+FALL_CAMPAIGN = """
+[campaign]
+model = "model.py"
+cases = 16
+design = "mc"
+seed = 1
+
+[dispersion.height_m]
+dist = "uniform"
+half_range = 20.0
+"""
+
+
+def test_the_metric_with_the_largest_error_is_named_such_as_an_altitude_at_the_ground_that_is_rounding(tmp_path):
+    (tmp_path / "model.py").write_text(FALL)
+    (tmp_path / "campaign.toml").write_text(FALL_CAMPAIGN)
+    done = CliRunner().invoke(app, ["bench", str(tmp_path), "--methods", "--cases", "16", "--repeats", "1"])
+    assert done.exit_code == 0, done.output
+    assert done.output.splitlines()[1].endswith("  (the model's own; ground_m)")
+
+
 def test_bench_prints_a_line_for_each_method(monkeypatch):
     timings = [
         MethodTiming(FixedStep(20.0, 86400.0), 2.5e-8, 60e-6),
