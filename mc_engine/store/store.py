@@ -279,7 +279,8 @@ class Store:
                 if disk.is_temporary(Path(file).name) or (is_part_file(file) and file not in counted):
                     disk.remove_file(self.path, file)
         for name in disk.names_in(self.path):  # not every temporary file: another process may be writing reports
-            if name in CUT_SHORT or (name.startswith(f".{NOMINAL}.") and disk.is_temporary(name)):
+            stray = (name == NOMINAL and self.nominal_part is None) or name in CUT_SHORT
+            if stray or (name.startswith(f".{NOMINAL}.") and disk.is_temporary(name)):
                 disk.remove_file(self.path, name)
 
     def append(self, first: int, count: int, columns: Mapping[str, Any]) -> None:

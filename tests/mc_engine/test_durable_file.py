@@ -5,7 +5,7 @@ import pytest
 
 from mc_engine import durable_file
 from mc_engine.durable_file import read_file, read_inside, write_durably
-from mc_engine.errors import StoreError
+from mc_engine.errors import DiskError, StoreError
 
 links = pytest.mark.skipif(sys.platform == "win32", reason="links need rights")
 
@@ -45,3 +45,17 @@ def test_on_a_system_with_a_sync_of_the_drive_that_one_is_asked_for_first(tmp_pa
     monkeypatch.setattr(os, "fsync", lambda descriptor: asked.append("fsync"))
     write_durably(tmp_path / "a", b"0")
     assert asked == [51, 51] if known else [51, "fsync", 51, "fsync"]
+
+
+@pytest.mark.parametrize("broken", ["write", "fsync", "replace"])
+def test_a_file_that_cannot_be_written_leaves_the_one_before_and_nothing_beside_it(tmp_path, monkeypatch, broken):
+    write_durably(tmp_path / "a", b"before")
+
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, broken, full)
+        with pytest.raises(DiskError, match=r"a: No space left"):
+            write_durably(tmp_path / "a", b"after")
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("a", b"before")]

@@ -1,42 +1,41 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from mc_engine.command_line.commands import app
 from mc_engine.errors import ModelError
 from mc_engine.units import UNITS, compatible, convert, nearest_unit, unit_hint, unit_of
 
+SYMBOLS = {
+    "m": 1.0, "g": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "day": 86_400.0, "Hz": 1.0, "N": 1.0, "Pa": 1.0,
+    "bar": 1e5, "J": 1.0, "eV": 1.602176634e-19, "W": 1.0, "K": 1.0, "V": 1.0, "A": 1.0, "Ohm": 1.0, "C": 1.0, "T": 1.0,
+    "rad": 1.0, "deg": np.pi / 180.0, "arcmin": np.pi / 10_800.0, "arcsec": np.pi / 648_000.0, "rev": 2.0 * np.pi,
+}  # fmt: skip
+PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "h": 1e2, "k": 1e3, "M": 1e6}
+NOT_OF_SYMBOLS = {
+    "": 1.0, "%": 0.01, "ppm": 1e-6, "g": 9.80665, "ug": 9.80665e-6, "rpm": np.pi / 30.0, "deg/rev": np.pi / 180.0,
+}  # fmt: skip
+
+
+def worth(unit):
+    """The SI value of a unit, from its name alone: powers, products and quotients of symbols with prefixes."""
+    if unit in NOT_OF_SYMBOLS:
+        return NOT_OF_SYMBOLS[unit]
+    values = {prefix + symbol: PREFIXES[prefix] * SYMBOLS[symbol] for prefix in PREFIXES for symbol in SYMBOLS}
+    return eval(unit.replace("^", "**").replace(" ", "*"), {**values, **SYMBOLS, "sqrt": np.sqrt})
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_every_unit_is_worth_what_its_name_says(unit):
+    assert UNITS[unit].factor == pytest.approx(worth(unit), rel=1e-15, abs=0.0)
+
 
 @pytest.mark.parametrize(
     ("value", "unit", "to", "expected"),
-    [
-        (250.0, "m", "km", 0.25),
-        (1.0, "km/s", "m/s", 1000.0),
-        (180.0, "deg", "rad", np.pi),
-        (2.0, "h", "min", 120.0),
-        (1.0, "g", "m/s^2", 9.80665),
-        (20.0, "%", "", 0.2),
-        (3600.0, "arcsec", "deg", 1.0),
-        (2.5, "mg/s", "kg/s", 2.5e-6),
-        (1.0, "keV", "J", 1.602176634e-16),
-        (60.0, "mN/kW", "N/W", 6e-5),
-        (60.0, "rpm", "rad/s", 2.0 * np.pi),
-        (1.0, "W h", "kJ", 3.6),
-        (1.0, "deg/h", "arcsec/s", 1.0),
-        (1.0, "deg/sqrt(h)", "deg/sqrt(s)", 1.0 / 60.0),
-        (398600.4418, "km^3/s^2", "m^3/s^2", 3.986004418e14),
-    ],
+    [(250.0, "m", "km", 0.25), (2.0, "h", "min", 120.0), (3600.0, "arcsec", "deg", 1.0), (1.0, "W h", "kJ", 3.6)],
 )
 def test_a_number_in_one_unit_becomes_the_number_in_another(value, unit, to, expected):
     assert convert(value, unit, to) == pytest.approx(expected, rel=1e-15)
-
-
-@given(value=st.floats(-1e9, 1e9), unit=st.sampled_from(sorted(UNITS)), data=st.data())
-def test_there_and_back_is_the_same_number(value, unit, data):
-    to = data.draw(st.sampled_from(compatible(unit)))
-    assert convert(convert(value, unit, to), to, unit) == pytest.approx(value, rel=1e-15)
 
 
 def test_only_units_of_the_same_quantity_are_compatible():

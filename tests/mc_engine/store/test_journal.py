@@ -90,7 +90,8 @@ def test_an_appended_line_is_there_for_the_next_reader(path):
     assert again.entries == journal.entries
 
 
-@pytest.mark.parametrize("torn", [LINES[0][:17], b"x" * 500])  # shorter and longer than the new line
+# shorter and longer than the new line; and with a newline that was on the disk before the bytes in front of it
+@pytest.mark.parametrize("torn", [LINES[0][:17], b"x" * 500, bytes(40) + b"\n"], ids=["short", "long", "zeros"])
 def test_appending_cuts_a_torn_line_off_first(path, torn):
     path.write_bytes(WHOLE + torn)
     Journal(path).append("finished", {})
@@ -109,6 +110,7 @@ def test_an_append_that_failed_does_not_count_and_can_be_tried_again(path, monke
         with pytest.raises(StoreError, match=r"journal\.jsonl: "):
             journal.append("lost", {})
     assert len(journal.entries) == 4
+    assert path.read_bytes() == WHOLE
     journal.append("kept", {})
     assert [entry.event for entry in Journal(path).entries] == ["part"] * 4 + ["kept"]
 

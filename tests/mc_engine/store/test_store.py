@@ -12,7 +12,6 @@ from small_run import COLUMNS, MANIFEST, TEXT, block, created, filled, row
 from mc_engine.durable_file import temporary_name
 from mc_engine.errors import StoreError
 from mc_engine.store import parts
-from mc_engine.store.journal import Journal
 from mc_engine.store.opening import open_store
 from mc_engine.store.parts import write_aside
 from mc_engine.store.run_files import NOMINAL_CASE, is_run_directory
@@ -145,21 +144,6 @@ def test_the_nominal_is_kept_apart_as_case_minus_one(store):
     assert nominal["ve_pct"] == given["ve_pct"]
     assert len(store.cases()) == 0
     assert pd.read_parquet(store.path / "nominal.parquet")["propellant_kg"].tolist() == [given["propellant_kg"]]
-
-
-def test_a_kill_while_the_nominal_is_replaced_leaves_no_nominal_rather_than_damage(store, monkeypatch):
-    store.write_nominal(row(7))
-    append = Journal.append
-
-    def killed(journal, event, *facts):
-        if event == "nominal":
-            raise KeyboardInterrupt
-        return append(journal, event, *facts)
-
-    monkeypatch.setattr(Journal, "append", killed)
-    with pytest.raises(KeyboardInterrupt):
-        store.write_nominal(row(8))
-    assert open_store(store.path).nominal() == {}
 
 
 def test_a_nominal_that_a_worker_wrote_is_committed_or_removed_by_the_next_writer(store):
