@@ -52,12 +52,20 @@ def test_a_fault_in_the_table_is_refused_with_row_and_column(folder):
         ("-2", "-200", '"cases.csv", row 2, column "speed_pct": -200 is not within -100 % and above'),
         ("clipped", "cut", '"cases.csv", row 2, column "control": "cut" is none of continuous, clipped, off'),
         ("false", "no", '"cases.csv", row 2, column "drag": "no" is none of true, false'),
-        ("\n1,", "\n7,", '"cases.csv", row 2: case_id is 7; rows are numbered 0, 1, 2, ...'),
         ("\n1,-2,", "\n1,", '"cases.csv", line 3: 4 fields where 5 columns are named'),
         ("height_km", "speed_pct", '"cases.csv" has the column "speed_pct" twice'),
     ]:
         (folder / "cases.csv").write_text(CSV.replace(old, new))
         assert problems("", "table", head=HEAD, directory=folder) == {"campaign.table": message}
+
+
+def test_a_table_has_its_cases_in_order_and_may_go_to_the_ends_of_a_range(folder):
+    head, *rows = CSV.replace("-2", "-100").splitlines()
+    (folder / "cases.csv").write_text("\n".join([head, *rows]))
+    assert case_table(load("", "table", head=HEAD, directory=folder), np.array([1]))["speed_pct"].tolist() == [-100.0]
+    (folder / "cases.csv").write_text("\n".join([head, rows[0], rows[2], rows[1]]))
+    message = '"cases.csv", row 2: case_id is 2; rows are numbered 0, 1, 2, ...'
+    assert problems("", "table", head=HEAD, directory=folder) == {"campaign.table": message}
 
 
 def test_a_table_without_rows_or_without_parameters_is_refused(folder):

@@ -6,6 +6,7 @@ from scipy.stats import kstest, norm, spearmanr
 from toy import load
 
 from mc_engine.campaign.cases import case_table, dispersion_records, full_inputs
+from mc_engine.errors import CampaignError
 from mc_engine.sampling.designs import RANDOM
 from mc_engine.sampling.streams import stream
 
@@ -69,6 +70,12 @@ def test_the_draws_follow_the_distributions_and_the_correlation(design):
     assert (table["control"] == "off").mean() == pytest.approx(0.25, abs=0.03)
     assert spearmanr(table["speed_pct"], table["mass_kg"]).statistic == pytest.approx(0.6, abs=0.03)
     assert spearmanr(table["speed_pct"], table["delay_s"]).statistic == pytest.approx(0.0, abs=0.05)
+
+
+@pytest.mark.parametrize("case", [-1, 64])
+def test_a_case_that_the_campaign_does_not_have_is_refused(case):
+    with pytest.raises(CampaignError, match=f"there is no case {case}; they are 0 to 63"):
+        case_table(load(BODY, "lhs", cases=64), np.array([0, case]))
 
 
 def test_all_inputs_are_the_nominal_ones_but_for_the_dispersed_columns():

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mc_engine.campaign.cases import case_table
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.sections import InputsSection
@@ -161,7 +162,10 @@ def test_what_was_taken_is_verified_before_it_is_used(folder, tmp_path, kind):
 
 
 def test_neither_chunks_nor_the_number_of_cases_change_a_case(folder, cases, tmp_path):
-    some = run(load_campaign(folder / "second", cases=17), tmp_path / "some", chunk=5, workers=2).cases()
+    campaign = load_campaign(folder / "second", cases=17)
+    with pytest.raises(CampaignError, match="there is no case 17; they are 0 to 16"):
+        case_table(campaign, np.array([17]))
+    some = run(campaign, tmp_path / "some", chunk=5, workers=2).cases()
     pd.testing.assert_frame_equal(some.set_index("case_id"), cases[1].iloc[:17], check_exact=True)
 
 
@@ -180,7 +184,12 @@ def test_a_campaign_that_is_not_flown_yet_is_flown_first_beside_the_run(folder, 
 
 def test_what_does_not_fit_is_said_with_its_place(folder):
     text = (folder / "second" / "campaign.toml").read_text()
+    grid = FIRST.replace('"mc"\ncases = 40', '"grid"').replace(
+        'dist = "normal"\nmean = 4.0\nsigma = 2.0', "levels = 3\nupper = 9"
+    )
+    (folder / "first" / "grid.toml").write_text(grid)
     for change, message in [
+        (('from = "../runs/first"', 'from = "../first/grid.toml"'), 'its design "grid" does not go with "mc"'),
         (('from = "../runs/first"', 'from = "../runs/none"'), "is neither a run nor a campaign that can be flown"),
         (('height_km = "top_m"', 'heigth_km = "top_m"'), 'is not a parameter of throw; did you mean "height_km"?'),
         (('height_km = "top_m"', 'height_km = "to_m"'), '"to_m" is no column of numbers of that run'),

@@ -159,6 +159,15 @@ def test_a_covariance_without_a_frame_is_in_that_of_its_segment_whatever_frame_t
     assert [state.covariance_frame for state in read_message(text)] == ["RTN", "EME2000", "RTN"]
 
 
+def test_a_state_is_of_its_own_segment_and_may_have_accelerations():
+    text = oem("1998-12-18T14:28:15")
+    state = next(line for line in text.splitlines() if line.startswith("1998"))
+    segment = text.split("\n", 1)[1].replace("EME2000", "ICRF")
+    first, second = read_message(f"{text}\n{segment}".replace(state, f"{state} 0 0 0", 1).replace(f"\n{state}\n", "\n"))
+    assert first.state.tolist() == list(STATE)
+    assert (second.frame, second.state) == ("ICRF", None)
+
+
 def test_units_and_epochs_that_a_message_writes_out_are_read():
     read = read_message(opm().replace("CX_X = ", "CX_X = 0").replace("\nCY_X", " [km ** 2]\nCY_X"))[0]
     assert np.array_equal(read.covariance, MATRIX)
@@ -249,7 +258,8 @@ def test_a_message_that_cannot_be_used_is_refused_with_a_sentence(folder):
         (opm().replace("CZ_Z = ", "C_Z = "), "CZ_Z is missing"),
         (opm().replace("3.11548208", "fast"), '"fast" is not a finite number'),
         (opm().replace("CX_X = 0.00033", "CX_X = -0.00033"), "variance of X is not above 0"),
-        (opm().replace("CY_X = 0.00046", "CY_X = 0.00056"), "not positive definite"),
+        (opm().replace(f"CX_X = {MATRIX[0, 0]}", "CX_X = 0"), "variance of X is not above 0"),
+        (opm().replace("CY_X = 0.00046", "CY_X = 0.00056"), '"state.opm": the covariance is not positive definite'),
         (oem("1998-12-18T14:28:15", "1998-12-18T15:28:15"), "has 2 covariances"),
         (oem("yesterday"), '"yesterday" is not an epoch'),
         ("CCSDS_OEM_VERS = 3.0", "no covariance"),

@@ -50,7 +50,7 @@ def test_a_dispersion_is_read_in_the_unit_of_its_parameter():
         ('dist = "triangular"\nhalf_range = 2', Triangular(8.0, 10.0, 12.0)),
         ('dist = "triangular"\nlower = 1\nmode = 2\nupper = 4', Triangular(1.0, 2.0, 4.0)),
         ('dist = "lognormal"\nlog_sigma = 0.1', Lognormal(10.0, 0.1)),
-        ('dist = "lognormal"\nmedian = 3\nlog_sigma = 0.1', Lognormal(3.0, 0.1)),
+        ('dist = "lognormal"\nmedian = 3000\nlog_sigma = 0.1\nunit = "m"', Lognormal(3.0, 0.1)),
         ('dist = "lognormal"\nmean = 3\nsigma = 1', Lognormal.from_moments(3.0, 1.0)),
         ('dist = "beta"\nalpha = 2\nbeta = 3\nlower = 500\nupper = 700\nunit = "m"', Beta(2.0, 3.0, 0.5, 0.7)),
         ('dist = "exponential"\nscale = 2', Exponential(10.0, 2.0)),
@@ -89,6 +89,7 @@ MISTAKES = [
     ('dist = "lognormal"\nmedian = 3\nsigma = 1', "", "needs median with log_sigma, or mean with sigma"),
     ('dist = "beta"\nalpha = 1\nbeta = 1\nlower = 2\nupper = 1', "lower", "2 is not below upper = 1"),
     ('dist = "discrete"\nvalues = [1, 2]\nweights = [1]', "weights", "1 weights for 2 values"),
+    ('dist = "discrete"\nvalues = [1, 2]\nweights = [1, 2, 3]', "weights", "3 weights for 2 values"),
     ('dist = "discrete"\nvalues = [1, 2]\nweights = [0, 0]', "weights", "are all zero"),
     ('dist = "discrete"\nvalues = [1, 2]\nweights = [5e-324, 0]', "weights", "are too small"),
     ('dist = "discrete"\nvalues = [1, 2]\nweights = [1, -1]', "weights 2", BELOW),
@@ -103,6 +104,9 @@ MISTAKES_OF_OTHERS = [
     ("mass_kg", 'dist = "constant"\nvalue = -1', "value", NEGATIVE),
     ("mass_kg", 'dist = "discrete"\nvalues = [1, -1]', "values 2", NEGATIVE),
     ("mass_kg", 'dist = "normal"\nsigma = 50', "", f"0.023 {OUTSIDE}"),
+    ("mass_kg", 'dist = "normal"\nsigma = 17', "", f"2e-09 {OUTSIDE}"),
+    ("speed_pct", 'dist = "lognormal"\nlog_sigma = 0.1', "median",
+     "the nominal value 0 is not above 0, as a log-normal must be"),
     ("mass_kg", 'dist = "normal"\nsigma = 50\nlower = -10', "", f"0.009 {OUTSIDE}"),
     ("mass_kg", 'dist = "exponential"\nscale = 5\norigin = -5', "", f"0.63 {OUTSIDE}"),
     ("control", 'dist = "discrete"\nvalues = ["off", "cliped"]', "values 2",
@@ -139,6 +143,7 @@ def test_a_wrong_dispersion_is_refused_with_the_reason():
         assert problem(body, name) == {key: message}
     for body, key, message in MISTAKES_OF_AXES:
         assert problem(body, design="grid") == {key: message}
+    assert problem("levels = 3\nlower = -1\nupper = 5", "mass_kg", "grid") == {"": NEGATIVE}
 
 
 def test_a_tail_of_one_in_a_thousand_million_is_cut_at_the_range_of_the_parameter():
@@ -165,3 +170,4 @@ def test_a_grid_takes_values_or_equal_steps_between_bounds():
         ('dist = "constant"\nvalue = 3', (3.0,)),
     ]:
         assert levels(body) == pytest.approx(expected)
+    assert levels("half_range = 2", "one_at_a_time") == (8.0, 12.0)

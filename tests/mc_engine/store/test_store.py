@@ -117,6 +117,8 @@ def test_a_case_is_never_committed_twice(store, first, count):
     others = {**block(first, count), "ve_pct": np.full(count, 99.0)}
     with pytest.raises(StoreError, match="committed already"):
         store.append(first, count, others)
+    with store.lock(), pytest.raises(StoreError, match="committed already"):  # a worker's that was taken for dead
+        store.publish(write_aside(store.path, store.columns, first, count, others))
     assert damage(store.path) == []  # refused before a committed file was written over
     assert store.cases()["ve_pct"].tolist() == block(0, 40)["ve_pct"].tolist()
 
