@@ -317,6 +317,12 @@ def sync_folder(path: Path) -> None:
         _sync_names(folder)
 
 
+def sync_names(root: Path, name: str) -> None:
+    """Make the names in the folder of the file `name` of a directory durable."""
+    with _parent(root, name) as (folder, _):
+        _sync_names(folder)
+
+
 def _sync_names(folder: _Folder) -> None:
     """Sync the names in a folder.  Windows cannot open a folder; there the file system journals renames."""
     if folder.descriptor is not None:

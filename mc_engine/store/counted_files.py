@@ -3,9 +3,9 @@
     {"n": 2, ..., "event": "files", "files": [{"file": "report.html", "bytes": 4711, "sha256": ...}], "removed": []}
 
 Used for the results of `tune` and `rare`, and for reports and replays in any directory.  Each file is first written
-completely under a temporary name, then one journal line records them all, then each file is renamed.  After a kill
-either the old or the new files are valid: a recorded file that still has its temporary name is read under that name,
-and the next writer renames it.
+completely under a temporary name, then one journal line records them all, then each file is renamed.  After a kill or
+a power cut either the old or the new files are valid: a recorded file that still has its temporary name is read under
+that name, and the next writer renames it.
 """
 
 import os
@@ -27,6 +27,7 @@ from mc_engine.durable_file import (
     publish,
     read_inside,
     remove_file,
+    sync_names,
     temporary_name,
     write_inside,
     write_synced,
@@ -223,6 +224,8 @@ class CountedFiles:
             for name, content in files.items():
                 make_way(self.root, name)
                 write_synced(self.root, temporary_name(name), content, name)
+            for name in {name.rpartition("/")[0]: name for name in files}.values():  # one in each folder
+                sync_names(self.root, name)
         except BaseException:
             for name in files:
                 with suppress(StoreError):

@@ -13,7 +13,9 @@ from stones import assert_as_unbroken, assert_no_wrong_row, completed, results, 
 from test_full_disks import engine
 from watched_disk import Listener, watched_disk
 
+from mc_engine.durable_file import make_folder
 from mc_engine.runner import runner
+from mc_engine.store.derived_files import derived_files
 from mc_engine.store.verification import damage
 
 CASES, CHUNK = 200, 20
@@ -200,3 +202,22 @@ def test_a_run_cut_short_while_it_was_made_is_begun_anew_in_the_same_folder(reco
     assert done.returncode == 0, done.stderr
     assert damage(after) == []
     assert results(after)["nominal.parquet"] == whole["nominal.parquet"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_power_cut_leaves_the_reports_of_before_or_those_after(tmp_path, kind):
+    """The second writing replaces a file, and the third makes a folder of its own."""
+    recorder, run, states = Recorder(), tmp_path / "disk" / "run", [{}]
+    run.parent.mkdir()
+    with watched_disk(run.parent, recorder):
+        make_folder(run)
+        for name, content in (("report.html", b"old"), ("report.html", b"new"), ("replay/case-3.parquet", b"PAR1")):
+            derived_files(run).write({name: content})
+            states.append({**states[-1], name: content})
+            recorder.said(len(states) - 1, 0, 0)
+    rng, disk = np.random.default_rng(KINDS.index(kind)), Disk(run)
+    for number, operation in enumerate(recorder.operations):
+        disk.play(*operation)
+        after = disk.cut(tmp_path / f"{number}", kind, rng)
+        if after.exists():
+            assert derived_files(after).read() in states[disk.said : disk.said + 2], number

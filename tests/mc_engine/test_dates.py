@@ -37,3 +37,10 @@ def test_what_is_no_date_is_said_with_an_example(value):
     found = Findings()
     assert check_value(value, EPOCH, found, "here") is None
     assert 'is not a date; write it in UTC as "2019-01-01T12:00:00"' in found.problems[0].message
+
+
+@pytest.mark.parametrize("value", ["1899-12-31T00:00:00", 99999])
+def test_a_date_outside_the_range_of_the_model_is_refused(value):
+    found = Findings()
+    assert check_value(value, EPOCH, found, "here") is None
+    assert "the model accepts 1950-01-01T00:00:00 to 2099-12-31T00:00:00" in found.problems[0].message

@@ -139,6 +139,7 @@ def test_the_digest_tells_campaigns_apart_by_content_and_not_by_layout():
     assert digest() == digest("cases = 64", "cases = 128")  # extended, and still the same campaign
     assert digest() != digest("seed = 0", "seed = 1")
     assert digest(seed=1) == digest("seed = 0", "seed = 1")
+    assert digest() == digest("[campaign]", "[report]\nprobability = 0.95\n[campaign]")  # how a run is told
     assert digest() != digest("20.0", "21.0")
     assert digest() != digest("sobol", "mc")
     assert digest("sobol", "lhs") != digest("sobol", "lhs", cases=65)

@@ -1,8 +1,11 @@
 import pytest
 from toy import load, problems
 
+from mc_engine.campaign.inputs import check_value
 from mc_engine.campaign.parts import Requirement
+from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.sections import HistoriesSection
+from mc_engine.model import Setting
 
 TWO = """
 [dispersion.speed_pct]
@@ -27,6 +30,17 @@ def test_parameters_override_numbers_words_and_switches():
     assert campaign.parameters == changed
     assert {name: campaign.nominal[name] for name in changed} == changed
     assert campaign.nominal["height_km"] == 10.0
+
+
+def test_a_setting_that_counts_takes_whole_numbers_alone():
+    count, findings = (
+        Setting(2, "Number of thrusters", low=1, high=8, whole=True, name="thrusters", unit=""),
+        Findings(),
+    )
+    assert check_value(4.0, count, findings, "") == 4.0
+    assert check_value(2.5, count, findings, "") is None
+    message = "2.5 is not a whole number; thrusters is Number of thrusters"
+    assert [problem.message for problem in findings.problems] == [message]
 
 
 def _with(partner, rank="0.3"):

@@ -77,6 +77,8 @@ def folder(tmp_path):
 def test_an_empirical_dispersion_repeats_measured_values_in_the_parameters_unit(folder):
     campaign = load(BODY + 'unit = "m"', directory=folder)
     assert campaign.dispersions[0].distribution == Empirical((9.0, 10.0, 11.0))
+    (folder / "m.csv").write_text((folder / "m.csv").read_text().replace("9000", "9001"))
+    assert load(BODY + 'unit = "m"', directory=folder).digest != campaign.digest
 
 
 def test_an_empirical_dispersion_that_cannot_be_drawn_is_refused(folder):

@@ -43,6 +43,19 @@ def test_what_a_kill_leaves_is_told_and_is_no_damage(killed, name):
     assert call("verify", killed.path).stderr == ""
 
 
+@pytest.mark.parametrize("harm", ["none", "flipped", "cut"])
+def test_a_part_that_a_killed_worker_wrote_counts_if_every_byte_is_right(killed, harm):
+    written = parts.write_aside(killed.path, killed.columns, 10, 10, block(10, 10))
+    path = killed.path / written.temporary
+    content = bytearray(path.read_bytes())
+    if harm == "flipped":  # in the last column, which need not be read to know the part's cases
+        content[-12 - int.from_bytes(content[-8:-4], "little")] ^= 1
+    path.write_bytes(content[:-1] if harm == "cut" else content)
+    with killed.lock():
+        assert killed.committed() == [(0, 20 if harm == "none" else 10)]
+    assert damage(killed.path) == []
+
+
 def test_a_part_without_a_line_is_damage_where_no_writer_was_killed(killed):
     (killed.path / ".lock").write_bytes(b"")
     leave(killed, STRAY)
