@@ -243,7 +243,8 @@ def _unfinished(journal: Scan, counted: Receipts, manifest: dict[str, Any] | Non
 def _line_problems(journal: Scan, wrong: dict[int, str], busy: bool, remedy: str) -> Iterator[Damage]:
     lines = {number: "" for number in journal.damaged} | {number: f", {why}" for number, why in wrong.items()}
     for number, why in sorted(lines.items()):
-        yield Damage(f"{JOURNAL}, line {number}: damaged{why}", REPAIR if number > 1 else ORIGINAL)
+        if number > 1:  # without the first line the creation is lost, which is said of it
+            yield Damage(f"{JOURNAL}, line {number}: damaged{why}", REPAIR)
     last = len(journal.entries) + len(journal.damaged) + 1
-    if journal.torn and not busy and last > 1:  # without a first line the creation is lost, which is said of it
+    if journal.torn and not busy and last > 1:
         yield Damage(f"{JOURNAL}, line {last}: torn; the next writer cuts it off", remedy)

@@ -131,8 +131,8 @@ def _two_digits_up(cases: int) -> int:
 
 
 def integration_table(flown: Flown) -> Table | None:
-    """How much finer steps change the metrics, against their spread; None where that is not known."""
-    facts, shares = flown.integration, {name: flown.integration_share(name) for name in flown.summaries}
+    """How much finer steps change the metrics that matter, against their spread; None where that is not known."""
+    facts, shares = flown.integration, {name: flown.integration_share(name) for name in flown.key_metrics}
     known = {name: share for name, share in shares.items() if share is not None}
     if not known:
         return None

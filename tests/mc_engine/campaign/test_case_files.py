@@ -17,6 +17,7 @@ def write(folder, name, text):
 def test_the_numbers_of_a_column_come_back_sorted(tmp_path):
     path = write(tmp_path, "m.csv", "a,b\n3,1\n\n2,x\n")
     assert empirical_numbers(path, "a") == (2.0, 3.0)
+    assert empirical_numbers(write(tmp_path, "n.csv", "3\n1\n2\n"), None) == (1.0, 2.0, 3.0)  # without a name
 
 
 def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path):

@@ -138,13 +138,14 @@ def test_roles_and_nominal_case_follow_the_chain(folder):
     assert store.manifest["upstream"]["links"] == {"height_km": "top_m"}
 
 
-def test_a_case_that_failed_upstream_keeps_its_row_and_says_why(cases):
+def test_a_case_that_failed_upstream_keeps_its_row_and_says_why(folder, cases):
     first, second = cases
     failed = first["status"] != "ok"
     assert failed.sum() >= 1
     assert set(second["status"][failed]) == {"refused"}
     assert set(second["reason"][failed]) == {"its case of first ended as refused"}
     assert second["gravity_m_s2"][failed].notna().all()
+    assert replay(folder / "runs" / "second", int(failed.to_numpy().argmax())).differences == ()
 
 
 @pytest.mark.parametrize("kind", ["gone", "flipped"])
@@ -180,6 +181,20 @@ def test_a_campaign_that_is_not_flown_yet_is_flown_first_beside_the_run(folder, 
     with pytest.raises(StoreError, match="takes its inputs from another run"):
         extend(tmp_path / "both", 80)
     fails_with(2, call("extend", tmp_path / "both", "--cases", 80), "takes its inputs from another run")
+    shutil.rmtree(tmp_path / "both")
+    other = replace(chain, first=replace(chain.first, digest="of another campaign"))
+    for extended, asked in ((40, other), (41, chain)):
+        if extended > 40:
+            extend(tmp_path / "both-first", extended)
+        with pytest.raises(StoreError, match="both-first: holds another run than this campaign takes its inputs from"):
+            run(asked, tmp_path / "both")
+
+
+def test_numbers_from_outside_hold_also_where_the_first_campaign_is_yet_to_be_flown(folder, tmp_path):
+    text = (folder / "second" / "campaign.toml").read_text().replace("../runs/first", "../first/campaign.toml")
+    text = text.replace("seed = 2", "seed = 2\ncases = 40")
+    store = run(load_campaign("second", text=text, directory=folder / "second", cases=6, seed=9), tmp_path / "both")
+    assert (store.n_cases, store.manifest["campaign"]["seed"]) == (6, 9)
 
 
 def test_what_does_not_fit_is_said_with_its_place(folder):
@@ -221,6 +236,21 @@ def test_a_run_whose_nominal_case_has_no_number_is_refused(folder, nominal, mess
     section = InputsSection.model_validate({"from": "first", "columns": {"height_km": "top_m"}})
     link(replace(rows, nominal={**rows.nominal, **nominal}), section, second.model, (), findings)
     assert [message in str(problem) for problem in findings.problems] == [True]
+
+
+def test_a_case_that_failed_upstream_gives_no_number_and_an_incomplete_run_is_refused(folder, tmp_path):
+    path = shutil.copytree(folder / "runs" / "first", tmp_path / "first")
+    rows, second, findings = read_rows(path), load_campaign(folder / "second"), Findings()
+    section = InputsSection.model_validate({"from": "first", "columns": {"height_km": "top_m"}})
+    status, top = (rows.table[name].copy() for name in ("status", "top_m"))
+    status[7], top[7] = "no-stop", 5.0  # where it was when it was given up
+    linked = link(
+        replace(rows, table={**rows.table, "status": status, "top_m": top}), section, second.model, (), findings
+    )
+    assert np.isnan(linked.table["height_km"][7])
+    open_store(path).withdraw(open_store(path).parts[0])
+    with pytest.raises(StoreError, match="first: is not complete; `mc-engine resume"):
+        read_rows(path)
 
 
 def test_a_run_to_take_inputs_from_is_refused_where_the_campaign_takes_none(folder, tmp_path):

@@ -53,6 +53,7 @@ SLIPS = [
     ('metric = "range_m"\ngoal', 'metric = "rnage_m"\ngoal', "tuning.objective.far.metric", 'did you mean "range_m"?'),
     ("[dispersion.mass_kg]", "[dispersion.angle_deg]", "tuning.parameter.angle_deg", "chosen or dispersed, not both"),
     (DISPERSED, "", "tuning.objective.fuel.quantile", "nothing is dispersed"),
+    ("lower = 10.0", "lower = 80.0", "tuning.parameter.angle_deg.lower", "80 is not below upper = 80"),
     ("objective.far", "objective.angle_deg", "tuning.objective.angle_deg", "is the name of a parameter already"),
     ("objective.far", "objective.feasible", "tuning.objective.feasible", "a column of every tuning"),
     ("at_most = 5.0", "at_most = 5.0\nat_least = 1.0\nquantile = 0.5", "tuning.constraint.near.quantile", "two limits"),

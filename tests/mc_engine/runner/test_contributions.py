@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from mc_engine import load_campaign, open_store
+from mc_engine.campaign.sensitivity_design import companion, noise_ids
 from mc_engine.errors import CampaignError, RunInterrupted
 from mc_engine.runner import runner
 from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
+from mc_engine.status import MOST_CASES
 
 MODEL = Path(__file__).parent / "contributions" / "model.py"
 HEAD = '[campaign]\nmodel = "model.py"\ncases = 100\ndesign = "mc"\nseed = 3\n'
@@ -113,6 +115,19 @@ def test_flights_broken_off_are_resumed_to_the_same_bytes(tmp_path):
     assert len(ours) == 512 * (4 + 4)  # groups: odd, x2, x4 and the random draws, which have two rows more
     assert ours.equals(theirs)
     assert runner.replay(tmp_path / "run" / "sensitivity", 1001).equal
+
+
+def test_inputs_that_are_correlated_are_one_group(tmp_path):
+    pairs = "".join(f"[[correlation]]\nbetween = ['{a}', '{b}']\nrank = 0.5\n" for a, b in (("x1", "x3"), ("x4", "x1")))
+    groups = campaign(tmp_path, pairs + "[sensitivity]\ncases = 64\n").sensitivity.groups
+    assert [members for members in groups.values()] == [("x1", "x3", "x4"), ("x2",), ("ticket",)]
+
+
+def test_noise_in_flight_is_shared_by_rows_of_one_block_and_by_no_case_of_the_run(tmp_path):
+    beside = companion(campaign(tmp_path, "[sensitivity]\ncases = 64\n"))
+    noise = noise_ids(beside, np.arange(beside.cases)).reshape(64, -1)
+    assert noise.min() > MOST_CASES
+    assert len(np.unique(noise)) == sum(len(np.unique(block)) for block in noise) == 3 * 64
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from mc_engine.runner.summary import (
 from mc_engine.statistics import summarize
 from mc_engine.status import OK, STATUS_NAME
 from tests.mc_engine.command_line.cart import small_store
+from tests.mc_engine.store.small_run import block
 
 
 def test_numbers_of_a_verdict_count_failed_cases_as_not_inside(tmp_path):
@@ -58,6 +59,16 @@ def test_a_verdict_reads_as_a_sentence_with_its_unit(tmp_path):
     assert line == "fuel: pass, propellant_kg ≤ 100 kg in 36 of 40 cases (required: 50 % with 90 % confidence)"
     assert "propellant_kg ≤ 120,000,000 kg in" in verdict_line(replace(verdict, at_most=1.2e8), store.units)
     assert "propellant_kg ≤ 2,459,000.12345 kg in" in verdict_line(replace(verdict, at_most=2459000.12345), store.units)
+
+
+def test_parts_are_read_in_order_and_a_failed_case_has_no_value_whatever_its_row_contains(tmp_path):
+    store = small_store(tmp_path / "flown", fly=False)
+    for first in range(0, 40, 5):  # more parts than are read ahead
+        store.append(first, 5, {**block(first, 5), "propellant_kg": np.arange(first, first + 5.0)})
+    failed = (store.cases()["status"] != STATUS_NAME[OK]).to_numpy()
+    values = np.concatenate([numbers["propellant_kg"] for _, numbers in metric_parts(store, ["propellant_kg"])])
+    np.testing.assert_array_equal(values, np.where(failed, np.nan, np.arange(40.0)))
+    assert failed.sum() == summaries(store)["propellant_kg"].n_tried - summaries(store)["propellant_kg"].n_used == 4
 
 
 def test_a_run_read_part_by_part_has_the_summaries_of_its_whole_table(tmp_path):

@@ -10,7 +10,8 @@ import pytest
 
 from mc_engine import load_campaign, open_store
 from mc_engine.campaign.cases import case_table, full_inputs
-from mc_engine.errors import ModelError, RunInterrupted, StoreError
+from mc_engine.campaign.search import SHIPPED
+from mc_engine.errors import CampaignError, ModelError, RunInterrupted, StoreError
 from mc_engine.flight.flight import fly
 from mc_engine.model import FixedStep
 from mc_engine.runner import runner
@@ -46,6 +47,15 @@ def test_1000_cases_extended_to_2000_are_a_fresh_2000(flown, tmp_path):
     extended = runner.extend(tmp_path / "run", 2000)
     assert table_bytes(extended) == table_bytes(flown)
     assert extended.n_cases == 2000
+
+
+def test_a_design_in_blocks_is_extended_by_whole_blocks(tmp_path):
+    text = '[campaign]\nmodel = "model.py"\ncases = 12\ndesign = "saltelli"\nseed = 1\n'
+    text += '[dispersion.pitch_error_deg]\ndist = "uniform"\nhalf_range = 1.0\n'
+    runner.run(load_campaign("blocks", text=text, directory=SHIPPED / "minimal"), tmp_path / "run", workers=1)
+    with pytest.raises(CampaignError, match="cases: 13 "):
+        runner.extend(tmp_path / "run", 13)
+    assert open_store(tmp_path / "run").n_cases == 12
 
 
 def test_an_interrupted_run_is_completed_to_the_same_table(tmp_path):

@@ -10,7 +10,7 @@ import pytest
 from mc_engine import load_campaign, open_store
 from mc_engine.errors import CampaignError, RunInterrupted
 from mc_engine.runner import runner
-from mc_engine.runner.stopping import carry_on, fly_until_decided, refuse_undecidable
+from mc_engine.runner.stopping import carry_on, fly_until_decided, refuse_undecidable, schedule
 from mc_engine.runner.summary import analyses_line, judgement
 
 NO_PROGRESS = {"workers": 1}
@@ -94,3 +94,9 @@ def test_a_campaign_without_a_requirement_or_with_a_run_upstream_is_refused():
         refuse_undecidable(replace(minimal(), requirements=()))
     with pytest.raises(CampaignError, match="as many cases as the run upstream"):
         refuse_undecidable(load_campaign("reentry/from_deorbit"))
+
+
+def test_the_schedule_has_the_cases_that_decide_all_requirements_if_none_fails():
+    campaign = minimal(cases=300, share=0.95, confidence=0.95)
+    other = replace(campaign.requirements[0], share=0.97)
+    assert schedule(replace(campaign, requirements=(*campaign.requirements, other))) == (100, 125, 150, 225, 300)

@@ -35,10 +35,15 @@ def test_verify_reports_all_damage_at_once(store):
     assert "part-0000000000-0000000009.parquet: has no line" in text
 
 
-@pytest.mark.parametrize("left", [b"", b'{"torn'], ids=["empty", "torn first line"])
+@pytest.mark.parametrize("left", [b"", b'{"torn', b"damaged\n"], ids=["empty", "torn first line", "other lines"])
 def test_without_the_first_line_of_a_journal_the_one_remedy_is_its_original(store, left):
     everything(store)
-    (store.path / "journal.jsonl").write_bytes(left)
+    journal = store.path / "journal.jsonl"
+    if left.endswith(b"\n"):
+        left += journal.read_bytes().split(b"\n", 1)[1]
+    journal.write_bytes(left)
+    mend_journal(store.path)
+    assert journal.read_bytes() == left
     problems = verification.damages(store.path)
     [remedy] = verification.remedies("runs/x", problems)
     assert remedy.startswith("put back the original of journal.jsonl, or fetch a copy of the run; without it no repair")

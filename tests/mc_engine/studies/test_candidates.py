@@ -8,6 +8,7 @@ from apogee_tuning import apogee_and_speed, apogee_campaign
 
 from mc_engine.campaign.cases import case_table
 from mc_engine.flight.chunks import fly_cases, fly_in_threads
+from mc_engine.studies import candidates
 from mc_engine.studies.candidates import cases_per_candidate, fly_candidates
 
 CHOICES = np.array([[300.0, 100.0], [250.0, 60.0], [600.0, 200.0], [400.0, 150.0], [200.0, 50.0]])
@@ -62,14 +63,36 @@ def test_a_flight_that_ends_its_thread_is_not_waited_for():
     assert ends == ["no licence"]
 
 
-@pytest.mark.parametrize(("limit", "rank"), [("at_least", 2), ("at_most", 1)])
-def test_a_quantile_is_an_order_statistic_of_the_campaigns_own_cases(limit, rank):
-    """0.2 of 10 cases: the third smallest where small is bad, the second where large is."""
-    campaign = apogee_campaign(ROBUST.format(0.2, limit))
+@pytest.mark.parametrize(
+    ("quantile", "limit", "rank"),
+    [(0.2, "at_least", 2), (0.2, "at_most", 1), (0.25, "at_least", 2), (0.25, "at_most", 2)],
+)
+def test_a_quantile_is_an_order_statistic_of_the_campaigns_own_cases(quantile, limit, rank):
+    """Of 10 cases: never the better one of the two that a quantile lies between."""
+    campaign = apogee_campaign(ROBUST.format(quantile, limit))
     flown = fly_cases(campaign, np.arange(10))["apogee_altitude_km"]  # the untuned choice, 300 km and 100 m/s
     scores = scores_of(campaign, CHOICES[:1])
     assert scores.limited[0, 0] == np.sort(flown)[rank]
     assert len(np.unique(case_table(campaign, np.arange(10))["magnitude_error_pct"])) == 10
+
+
+@pytest.mark.parametrize(("limit", "worst"), [("at_least", -np.inf), ("at_most", np.inf)])
+def test_a_failed_case_takes_the_worst_rank_and_all_candidates_have_the_same_noise(monkeypatch, limit, worst):
+    campaign, flown = apogee_campaign(ROBUST.format(0.5, limit)), []
+
+    def fly(campaign, inputs, noise, wanted, workers):
+        columns = fly_in_threads(campaign, inputs, noise, wanted, workers)
+        columns["status"][[1 + 3, 1 + 5]] = "no-stop"  # of the first candidate, beside its nominal case
+        flown.append((noise, columns["apogee_altitude_km"]))
+        return columns
+
+    monkeypatch.setattr(candidates, "fly_in_threads", fly)
+    scores = scores_of(campaign, CHOICES[:2])
+    noise, apogees = flown[0][0].reshape(2, 11), flown[0][1].reshape(2, 11)[0, 1:]
+    assert noise.tolist() == 2 * [[candidates.NOMINAL_NOISE, *range(10)]]
+    apogees[[3, 5]] = worst
+    assert scores.limited[0, 0] == np.sort(apogees)[5 if limit == "at_least" else 4]
+    assert scores.failed.tolist() == [2, 0]
 
 
 def test_the_violation_is_the_excess_in_shares_of_the_limits():

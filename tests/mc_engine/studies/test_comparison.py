@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from comparable_runs import TEXT, run
+from comparable_runs import COLUMNS, TEXT, run
 
 from mc_engine.sampling.streams import uniforms
 from mc_engine.studies.comparison import compare_runs, pair_cases
@@ -184,3 +184,30 @@ def test_a_requirement_is_not_demonstrable_on_chosen_cases_and_the_tests_are_sai
     assert note.startswith("note: the cases of run B (design grid) were chosen, not drawn at random: p-values")
     assert "false alarm" not in answer
     assert compared(run(tmp_path / "c"), run(tmp_path / "d")).chosen == ""
+
+
+def test_a_failed_case_has_no_value_whatever_its_row_contains(tmp_path):
+    a, b = run(tmp_path / "a"), run(tmp_path / "b", failed=3)
+    part, worse = b.parts[0], b.cases()
+    columns = {name: worse[name].to_numpy() for name in worse.columns}
+    columns["propellant_kg"] = np.where(worse["status"] == "ok", worse["propellant_kg"], 99.0)
+    b.withdraw(part)
+    b.append(0, 400, columns)
+    assert repr(compared(a, b).metrics) == repr(compared(a, run(tmp_path / "c", failed=3)).metrics)
+
+
+def test_intervals_have_the_confidence_of_the_second_report_and_metrics_need_one_unit(tmp_path):
+    other = [replace(column, unit="km") if column.name == "range_m" else column for column in COLUMNS]
+    b = run(tmp_path / "b", columns=other, report={"confidence": 0.99})
+    found = compared(run(tmp_path / "a", report={"confidence": 0.6}), b)
+    assert found.confidence == 0.99
+    assert [one.metric for one in found.metrics] == ["propellant_kg", "pulses"]
+    assert found.left_out == ("range_m: in m in A, in km in B",)
+
+
+@pytest.mark.parametrize(("looks", "outcome"), [([], "pass"), ([25], "not demonstrable")])
+def test_verdicts_on_pairs_have_the_bounds_of_the_run_whose_size_was_not_fixed(tmp_path, looks, outcome):
+    """Time-uniform bounds ask for more cases than those of a run of fixed size."""
+    a, b = run(tmp_path / "a", n=25, limit=99.0), run(tmp_path / "b", n=25, limit=99.0, looks=looks)
+    [verdict] = compared(a, b).verdicts
+    assert (verdict.before, verdict.after) == (outcome, outcome)
