@@ -34,6 +34,8 @@ def test_all_together_take_the_most_of_each_and_the_joint_share_less():
     assert numbers(lines, "every requirement") == ["852", "1440", "1970", "2473", "2959", "3433"]
     assert "all at once: share 0.9473 with confidence 0.9" in lines
     assert numbers(lines, "all at once")[0] == "43"
+    heading = next(place for place, line in enumerate(lines) if "confidence shared among 3 (Bonferroni)" in line)
+    assert lines[heading + 1].split() == ["0", "852", "1259"]  # ln(0.1 / 3) / ln(0.9973)
     assert numbers(plan(RANGE), "range:")[0] == "852"
     assert not any(line.startswith(("every", "all at once")) for line in plan(RANGE))
 

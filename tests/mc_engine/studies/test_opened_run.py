@@ -49,6 +49,10 @@ def test_a_kept_history_is_read_and_pictured_and_any_other_is_flown(run, monkeyp
     flown = run.case(17).history()
     assert set(flown["case_id"]) == {17}
     assert flown["altitude_km"].iloc[-1] == pytest.approx(run.case(17).metrics["apogee_altitude_km"], abs=1e-9)
+    changed = replace(run.case(17).replay(), equal=False, differences=("case 17, apogee: stored 1.0, now 2.0",))
+    monkeypatch.setattr(runner, "replay", lambda *_: changed)
+    with pytest.raises(StoreError, match=r"case 17, apogee: stored 1.0, now 2.0; the run was changed"):
+        run.case(17).history()
     monkeypatch.setattr(runner, "replay", None)  # a kept one is not flown
     assert set(run.case(2).history()["case_id"]) == {2}
 

@@ -85,6 +85,7 @@ def test_the_outcome_follows_from_both_numbers_and_the_print():
         ({"ours": 3.84, "tolerance": 0.01}, NOT_REACHED),
         ({"ours": 3.815, "tolerance": 0.01}, CLOSE),
         ({"ours": 3.785, "tolerance": 0.01}, CLOSE),
+        ({"ours": 3.825, "tolerance": 0.01}, NOT_REACHED),
         ({"ours": 3.6, "better": "less"}, IMPROVED),
         ({"ours": 4.0, "better": "less"}, NOT_REACHED),
         ({"ours": 4.0, "better": "more"}, IMPROVED),

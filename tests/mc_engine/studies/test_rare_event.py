@@ -71,14 +71,15 @@ def test_plain_cases_of_the_campaign_agree(estimate):
 
 @pytest.mark.parametrize("method", ["subset", "cross-entropy"])
 def test_a_millionth_on_the_model_itself_is_that_of_the_integral(tmp_path, method):
-    result = estimate_rare_event(minimal(639.9), out=tmp_path / "out", method=method, workers=1).result
-    p = probability_below(639.9)
+    record = estimate_rare_event(minimal(639.9), out=tmp_path / "out", method=method, workers=1)
+    result, failed, p = record.result, record.cases[record.cases["failed"]], probability_below(639.9)
     assert 5e-7 < p < 2e-6
     assert result["lower"] <= p <= result["upper"]
     assert result["cases"] < 0.1 / p
     size = next(entry for entry in result["inputs"] if entry["name"] == "magnitude_error_pct")
     assert size["likeliest"] == pytest.approx(size["likeliest_sigma"], rel=1e-6)  # sigma is 1 %
     assert size["likeliest_sigma"] < -4.0
+    assert size["mean_sigma"] == pytest.approx(np.average(failed["magnitude_error_pct"], weights=failed["weight"]))
 
 
 def test_the_directory_holds_every_case_with_what_it_came_to(estimate):
@@ -141,6 +142,20 @@ def test_a_case_without_a_number_has_failed_and_one_at_its_limit_has_not():
     lost = LimitState(never, never.requirements[0])
     assert np.isneginf(lost(u, np.array([0, 1]))[1])  # less than nothing is no burn: refused
     assert lost.status[0][1] == "refused"
+
+
+def test_of_failures_on_two_sides_the_nearest_case_of_each_is_told(tmp_path):
+    campaign = minimal()
+    both = replace(campaign, requirements=(replace(campaign.requirements[0], at_most=669.2),))
+    record = estimate_rare_event(both, out=tmp_path / "out", cases_per_level=1000, workers=1)
+    failed = record.cases[record.cases["failed"]]
+    size = failed["magnitude_error_pct"].to_numpy()
+    u = np.column_stack([size, stats.norm.ppf(0.5 + failed["pitch_error_deg"] / 4.0)])
+    nearest = np.argmin((u**2).sum(axis=1))
+    across = np.argmin(np.where(u @ u[nearest] < 0.0, (u**2).sum(axis=1), np.inf))
+    told = record.result["inputs"][0]
+    assert (told["likeliest"], told["across"]) == pytest.approx((size[nearest], size[across]), rel=1e-9)
+    assert told["likeliest"] * told["across"] < 0.0
 
 
 def test_failures_all_around_the_origin_are_one_region(tmp_path):

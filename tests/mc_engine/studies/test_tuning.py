@@ -47,6 +47,8 @@ def test_no_candidate_beats_one_of_the_front(tuned):
     for row in tuned.front.itertuples():
         better = (every["apogee"] >= row.apogee) & (every["speed"] <= row.speed)
         assert (every[better][["apogee", "speed"]].to_numpy() == [row.apogee, row.speed]).all()
+    assert tuned.front["apogee"].is_monotonic_decreasing  # the best first
+    assert tuned.generations["front_size"].iloc[-1] == len(tuned.front)  # of all generations
 
 
 def test_the_same_seed_finds_the_same_bits_whatever_the_threads_and_another_seed_another_way(tmp_path):
@@ -57,6 +59,8 @@ def test_the_same_seed_finds_the_same_bits_whatever_the_threads_and_another_seed
     first, second, other = (record.path.joinpath("evaluations.parquet").read_bytes() for record in records)
     assert first == second
     assert first != other
+    zero = tune(apogee_campaign(), tmp_path / "zero", seed=0, generations=1, population=4)
+    assert zero.manifest["tuning"]["seed"] == 0
 
 
 def test_the_directory_holds_tables_with_units_the_text_and_what_was_searched(tuned):
