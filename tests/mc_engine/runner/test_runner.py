@@ -4,6 +4,9 @@ import json
 import os
 import shutil
 import signal
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +17,7 @@ from mc_engine.campaign.search import SHIPPED
 from mc_engine.errors import CampaignError, ModelError, RunInterrupted, StoreError
 from mc_engine.flight.flight import fly
 from mc_engine.model import FixedStep
-from mc_engine.runner import runner
+from mc_engine.runner import manifest, runner
 from mc_engine.store.verification import damage
 
 
@@ -94,6 +97,42 @@ def test_changed_sources_refuse_to_continue_a_run(flown, tmp_path):
     for act in (lambda: runner.resume(moved), lambda: runner.replay(moved, 0), lambda: runner.extend(moved, 3000)):
         with pytest.raises(StoreError, match=r"flown by other sources|model\.py: damaged or edited"):
             act()
+
+
+OTHERS = {
+    "model": ("mc_engine.runner.flown_campaign.flyer_of", lambda _: SimpleNamespace(digest=lambda: "another")),
+    "sampling": ("mc_engine.runner.manifest.sampling_digest", lambda: "another"),
+    "seed contract": ("mc_engine.sampling.streams.SEED_CONTRACT", 99),
+    "columns": ("mc_engine.runner.manifest.columns_of", lambda _: []),
+    "campaign": (
+        "mc_engine.runner.flown_campaign.load_campaign",
+        lambda *names, **options: replace(load_campaign(*names, **options), digest="another"),
+    ),
+}
+
+
+@pytest.mark.parametrize("other", OTHERS)
+def test_a_run_of_other_sources_is_neither_continued_nor_replayed(flown, monkeypatch, other):
+    monkeypatch.setattr(*OTHERS[other])
+    words = (
+        "a file of the campaign was edited" if other == "campaign" else "was flown by other sources of engine or model"
+    )
+    for act in (runner.resume, lambda path: runner.replay(path, 0), lambda path: runner.extend(path, 3000)):
+        with pytest.raises(StoreError, match=words):
+            act(flown.path)
+    assert damage(flown.path) == []
+
+
+@pytest.mark.parametrize("folder", ["sampling", "campaign"])
+def test_the_sources_that_draw_inputs_are_in_the_digest_of_sampling(tmp_path, monkeypatch, folder):
+    engine = Path(manifest.__file__).parents[1]
+    for name in ("sampling", "campaign"):
+        shutil.copytree(engine / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    before = manifest.sampling_digest()
+    monkeypatch.setattr(manifest, "__file__", str(tmp_path / "runner" / "manifest.py"))
+    assert manifest.sampling_digest() == before
+    (tmp_path / folder / "__init__.py").write_text("# changed")
+    assert manifest.sampling_digest() != before
 
 
 def test_histories_hold_the_nominal_and_the_first_cases(flown):
