@@ -9,7 +9,7 @@ import pytest
 
 from mc_engine import load_campaign, open_store
 from mc_engine.campaign.sensitivity_design import companion, noise_ids
-from mc_engine.errors import CampaignError, RunInterrupted
+from mc_engine.errors import CampaignError, RunInterrupted, StoreError
 from mc_engine.runner import runner
 from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
 from mc_engine.status import MOST_CASES
@@ -115,6 +115,17 @@ def test_flights_broken_off_are_resumed_to_the_same_bytes(tmp_path):
     assert len(ours) == 512 * (4 + 4)  # groups: odd, x2, x4 and the random draws, which have two rows more
     assert ours.equals(theirs)
     assert runner.replay(tmp_path / "run" / "sensitivity", 1001).equal
+
+
+def test_flights_of_another_campaign_are_not_taken_for_those_of_a_run(tmp_path):
+    for seed in ("3", "4"):
+        (tmp_path / seed).mkdir()
+        asked = campaign(tmp_path / seed, "[sensitivity]\ncases = 32\n", HEAD.replace("seed = 3", f"seed = {seed}"))
+        runner.run(asked, tmp_path / seed / "run")
+    shutil.rmtree(tmp_path / "3" / "run" / "sensitivity")
+    shutil.copytree(tmp_path / "4" / "run" / "sensitivity", tmp_path / "3" / "run" / "sensitivity")
+    with pytest.raises(StoreError, match="sensitivity: holds flights of another campaign; remove it, and `resume`"):
+        runner.resume(tmp_path / "3" / "run")
 
 
 def test_inputs_that_are_correlated_are_one_group(tmp_path):

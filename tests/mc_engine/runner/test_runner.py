@@ -18,6 +18,7 @@ from mc_engine.errors import CampaignError, ModelError, RunInterrupted, StoreErr
 from mc_engine.flight.flight import fly
 from mc_engine.model import FixedStep
 from mc_engine.runner import manifest, runner
+from mc_engine.runner.shards import Shard
 from mc_engine.store.verification import damage
 
 
@@ -52,10 +53,28 @@ def test_1000_cases_extended_to_2000_are_a_fresh_2000(flown, tmp_path):
     assert extended.n_cases == 2000
 
 
-def test_a_design_in_blocks_is_extended_by_whole_blocks(tmp_path):
-    text = '[campaign]\nmodel = "model.py"\ncases = 12\ndesign = "saltelli"\nseed = 1\n'
+def pitched(design, **options):
+    """The smallest model with one dispersion."""
+    text = f'[campaign]\nmodel = "model.py"\ncases = 12\ndesign = "{design}"\nseed = 1\n'
     text += '[dispersion.pitch_error_deg]\ndist = "uniform"\nhalf_range = 1.0\n'
-    runner.run(load_campaign("blocks", text=text, directory=SHIPPED / "minimal"), tmp_path / "run", workers=1)
+    return load_campaign("pitched", text=text, directory=SHIPPED / "minimal", **options)
+
+
+def test_a_latin_hypercube_of_another_size_than_the_files_is_replayed_and_resumed(tmp_path):
+    runner.run(pitched("lhs", cases=7), tmp_path / "run", workers=1)
+    assert runner.replay(tmp_path / "run", 3).equal
+    assert len(runner.resume(tmp_path / "run", workers=1).cases()) == 7
+
+
+def test_a_shard_has_its_own_cases_without_histories_and_flights_for_contributions(tmp_path):
+    """Which follow when all shards are merged."""
+    store = runner.run(load_campaign("minimal", cases=12), tmp_path / "run", workers=1, shard=Shard(2, 3))
+    assert (store.committed(), store.missing(), store.n_cases, store.history_part) == ([(4, 8)], [], 12, None)
+    assert not (tmp_path / "run" / "sensitivity").exists()
+
+
+def test_a_design_in_blocks_is_extended_by_whole_blocks(tmp_path):
+    runner.run(pitched("saltelli"), tmp_path / "run", workers=1)
     with pytest.raises(CampaignError, match="cases: 13 "):
         runner.extend(tmp_path / "run", 13)
     assert open_store(tmp_path / "run").n_cases == 12
