@@ -1,0 +1,70 @@
+"""Which cases are given up, by how often their workers died: with workers that die as told."""
+
+from collections import Counter
+
+import pytest
+
+from mc_engine.durable_file import leave
+from mc_engine.errors import WorkersLost
+from mc_engine.flight.chunks import Task
+from mc_engine.runner.dispatch import DIED, NO_MEMORY, Dispatch
+from mc_engine.runner.worker_process import IN_FLIGHT, _note
+from mc_engine.runner.workers import Result, WorkerPool
+
+
+class DyingWorkers(WorkerPool):
+    """One worker, which dies of some cases so many times.  error : of which it dies.  noting : what it flies."""
+
+    def __init__(self, run, deaths, error=None, noting=True):
+        super().__init__()
+        self._run, self._deaths, self._error, self._noting, self.begun = run, Counter(deaths), error, noting, 0
+
+    def room(self):
+        return 1
+
+    def begin(self, task):
+        self.begun += 1
+        flown = task.flown().tolist()
+        alone = [[case] for case in flown if case in task.alone]
+        for batch in [*alone, [case for case in flown if case not in task.alone]]:
+            if any(self._deaths[case] > 0 for case in batch):
+                self._deaths.subtract(case for case in batch if self._deaths[case] > 0)
+                if task.suspected and self._noting:
+                    leave(self._run, _note(IN_FLIGHT, batch[0], batch[-1]))
+                self._results.put(Result(task, error=self._error, died=True))
+                return
+        self._results.put(Result(task, written=task))
+
+    def close(self, at_once):
+        """Nothing to end."""
+
+
+@pytest.fixture
+def run(tmp_path):
+    (tmp_path / "cases").mkdir()
+    return tmp_path
+
+
+def flown_by(workers, run, cases=10):
+    return [task for task, _ in Dispatch(workers, run).receipts([Task(0, cases)], lambda: False)]
+
+
+def test_a_case_is_given_up_when_its_worker_dies_twice_while_it_flies_alone(run):
+    [task] = flown_by(DyingWorkers(run, {5: 3}), run)  # once unnoticed, once with others, once alone
+    assert task.lost == ()
+    [task] = flown_by(DyingWorkers(run, {5: 4}), run)
+    assert [(lost.case_id, lost.status, lost.reason) for lost in task.lost] == [(5, "worker-died", DIED)]
+    assert task.flown().tolist() == [0, 1, 2, 3, 4, 6, 7, 8, 9]
+
+
+def test_the_only_case_of_a_task_flies_as_often(run):
+    workers = DyingWorkers(run, {0: 100}, MemoryError())
+    [task] = flown_by(workers, run, 1)
+    assert [(lost.case_id, lost.reason) for lost in task.lost] == [(0, NO_MEMORY)]
+    assert workers.begun == 5
+
+
+def test_workers_that_die_before_a_case_flies_end_the_run(run):
+    workers = DyingWorkers(run, {0: 1000}, noting=False)
+    with pytest.raises(WorkersLost, match="cases 0 to 9: the workers die before a case flies"):
+        flown_by(workers, run)
