@@ -14,10 +14,12 @@ import pytest
 from mc_engine import load_campaign, open_store
 from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.search import SHIPPED
+from mc_engine.campaign.sections import HistoriesSection
 from mc_engine.errors import CampaignError, ModelError, RunInterrupted, StoreError
 from mc_engine.flight.flight import fly
 from mc_engine.model import FixedStep
 from mc_engine.runner import manifest, runner
+from mc_engine.runner.histories import write_histories
 from mc_engine.runner.shards import Shard
 from mc_engine.store.verification import damage
 
@@ -53,17 +55,27 @@ def test_1000_cases_extended_to_2000_are_a_fresh_2000(flown, tmp_path):
     assert extended.n_cases == 2000
 
 
-def pitched(design, **options):
+def pitched(design, more="", **options):
     """The smallest model with one dispersion."""
     text = f'[campaign]\nmodel = "model.py"\ncases = 12\ndesign = "{design}"\nseed = 1\n'
     text += '[dispersion.pitch_error_deg]\ndist = "uniform"\nhalf_range = 1.0\n'
-    return load_campaign("pitched", text=text, directory=SHIPPED / "minimal", **options)
+    return load_campaign("pitched", text=text + more, directory=SHIPPED / "minimal", **options)
 
 
 def test_a_latin_hypercube_of_another_size_than_the_files_is_replayed_and_resumed(tmp_path):
     runner.run(pitched("lhs", cases=7), tmp_path / "run", workers=1)
     assert runner.replay(tmp_path / "run", 3).equal
     assert len(runner.resume(tmp_path / "run", workers=1).cases()) == 7
+
+
+def test_histories_are_those_of_cases_that_the_run_has_and_none_are_stored_of_a_run_that_is_stopped(tmp_path):
+    campaign = pitched("mc", "[retention]\nhistories = { cases = [3, 9] }\n", cases=5)
+    store = runner.run(campaign, tmp_path / "run", workers=1)
+    kept = store.history_part
+    assert set(store.histories()["case_id"]) == {-1, 3}
+    more = replace(campaign, retention=HistoriesSection(first=2))
+    assert not write_histories(store, more, 1, lambda: True)
+    assert open_store(tmp_path / "run").history_part == kept
 
 
 def test_a_shard_has_its_own_cases_without_histories_and_flights_for_contributions(tmp_path):

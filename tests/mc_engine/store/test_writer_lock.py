@@ -114,6 +114,22 @@ def test_a_writer_without_system_locks_whose_lock_is_deleted_writes_nothing_more
     assert open_store(store.path).committed() == [(0, 20)]
 
 
+def test_a_writer_that_has_lost_its_lock_leaves_the_record_of_the_next_one(store, no_locks):
+    lost = store.lock()
+    lost.__enter__()
+    (store.path / ".lock").unlink()
+    with open_store(store.path).lock():
+        record = (store.path / ".lock").read_bytes()
+        lost.__exit__(None, None, None)
+        assert (store.path / ".lock").read_bytes() == record != b""
+
+
+def test_a_living_writer_that_had_no_system_locks_is_respected_by_one_that_has_them(store):
+    leave_record(store, pid=os.getppid(), locks=False)
+    with pytest.raises(StoreError, match=rf"process {os.getppid()} on .* is writing here"):
+        open_store(store.path).append(0, 10, block(0, 10))
+
+
 def test_a_lock_file_deleted_or_made_anew_in_flight_lets_nobody_in(store):
     with store.lock():
         for make in (lambda: None, (store.path / ".lock").touch):
@@ -149,11 +165,15 @@ def test_a_tuning_and_a_rare_event_have_one_writer(tmp_path):
 
 
 def test_a_new_directory_has_one_writer_and_is_gone_if_nothing_was_put_there(tmp_path):
+    asked = []
+
     def refuse():
+        asked.append((tmp_path / "new" / ".lock").exists())
         refuse_occupied(tmp_path / "new")
 
     def write(inside):
         with writer_of_new(tmp_path / "new", refuse):
+            assert asked[-2:] == [False, True]  # again with the lock: another may have been faster
             inside()
 
     def second():
