@@ -13,6 +13,7 @@ from mc_engine.errors import CampaignError, RunInterrupted, StoreError
 from mc_engine.runner import runner
 from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
 from mc_engine.status import MOST_CASES
+from mc_engine.store.verification import damage
 
 MODEL = Path(__file__).parent / "contributions" / "model.py"
 HEAD = '[campaign]\nmodel = "model.py"\ncases = 100\ndesign = "mc"\nseed = 3\n'
@@ -126,6 +127,18 @@ def test_flights_of_another_campaign_are_not_taken_for_those_of_a_run(tmp_path):
     shutil.copytree(tmp_path / "4" / "run" / "sensitivity", tmp_path / "3" / "run" / "sensitivity")
     with pytest.raises(StoreError, match="sensitivity: holds flights of another campaign; remove it, and `resume`"):
         runner.resume(tmp_path / "3" / "run")
+
+
+def test_a_damaged_line_about_the_flights_beside_a_run_is_repaired_with_the_run(tmp_path):
+    run = tmp_path / "run"
+    whole = runner.run(campaign(tmp_path, "[sensitivity]\ncases = 32\n"), run, workers=1).path / "sensitivity"
+    table, journal = open_store(whole).cases(), whole / "journal.jsonl"
+    journal.write_bytes(journal.read_bytes().replace(b'"event":"part"', b'"event":"paRt"', 1))
+    with pytest.raises(StoreError, match="line 4: damaged"):
+        runner.resume(run)
+    runner.resume(run, repair=True)
+    assert damage(run) == []
+    assert open_store(whole).cases().equals(table)
 
 
 def test_inputs_that_are_correlated_are_one_group(tmp_path):

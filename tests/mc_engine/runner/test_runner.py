@@ -62,6 +62,17 @@ def pitched(design, more="", **options):
     return load_campaign("pitched", text=text + more, directory=SHIPPED / "minimal", **options)
 
 
+def test_shards_with_a_damaged_part_are_not_merged_and_leave_no_run(tmp_path):
+    shards = [tmp_path / str(number) for number in (1, 2)]
+    for number, shard in enumerate(shards, start=1):
+        runner.run(pitched("mc"), shard, workers=1, shard=Shard(number, 2))
+    (part,) = (shards[1] / "cases").iterdir()
+    part.write_bytes(part.read_bytes()[:-1])
+    with pytest.raises(StoreError, match=rf"{part}: damaged"):
+        runner.merge(tmp_path / "whole", shards)
+    assert not (tmp_path / "whole").exists()
+
+
 def test_a_latin_hypercube_of_another_size_than_the_files_is_replayed_and_resumed(tmp_path):
     runner.run(pitched("lhs", cases=7), tmp_path / "run", workers=1)
     assert runner.replay(tmp_path / "run", 3).equal
