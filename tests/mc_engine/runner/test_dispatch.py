@@ -5,7 +5,6 @@ from collections import Counter
 import pytest
 
 from mc_engine.durable_file import leave
-from mc_engine.errors import WorkersLost
 from mc_engine.flight.chunks import Task
 from mc_engine.runner.dispatch import DIED, NO_MEMORY, Dispatch
 from mc_engine.runner.worker_process import IN_FLIGHT, _note
@@ -13,11 +12,11 @@ from mc_engine.runner.workers import Result, WorkerPool
 
 
 class DyingWorkers(WorkerPool):
-    """One worker, which dies of some cases so many times.  error : of which it dies.  noting : what it flies."""
+    """One worker, which dies of some cases so many times.  error : of which it dies."""
 
-    def __init__(self, run, deaths, error=None, noting=True):
+    def __init__(self, run, deaths, error=None):
         super().__init__()
-        self._run, self._deaths, self._error, self._noting, self.begun = run, Counter(deaths), error, noting, 0
+        self._run, self._deaths, self._error, self.begun = run, Counter(deaths), error, 0
 
     def room(self):
         return 1
@@ -29,7 +28,7 @@ class DyingWorkers(WorkerPool):
         for batch in [*alone, [case for case in flown if case not in task.alone]]:
             if any(self._deaths[case] > 0 for case in batch):
                 self._deaths.subtract(case for case in batch if self._deaths[case] > 0)
-                if task.suspected and self._noting:
+                if task.suspected:
                     leave(self._run, _note(IN_FLIGHT, batch[0], batch[-1]))
                 self._results.put(Result(task, error=self._error, died=True))
                 return
@@ -62,9 +61,3 @@ def test_the_only_case_of_a_task_flies_as_often(run):
     [task] = flown_by(workers, run, 1)
     assert [(lost.case_id, lost.reason) for lost in task.lost] == [(0, NO_MEMORY)]
     assert workers.begun == 5
-
-
-def test_workers_that_die_before_a_case_flies_end_the_run(run):
-    workers = DyingWorkers(run, {0: 1000}, noting=False)
-    with pytest.raises(WorkersLost, match="cases 0 to 9: the workers die before a case flies"):
-        flown_by(workers, run)

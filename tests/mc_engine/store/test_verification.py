@@ -6,7 +6,6 @@ from small_run import block, filled, row
 
 from mc_engine.errors import StoreError
 from mc_engine.store import parts, verification
-from mc_engine.store.journal import encode
 from mc_engine.store.opening import open_store
 from mc_engine.store.repair import mend_journal
 from mc_engine.store.verification import damage
@@ -82,23 +81,6 @@ def test_an_edited_manifest_or_campaign_is_refused_by_name(store, name):
         file.write("\n")
     with pytest.raises(StoreError, match=rf"{name}: damaged or edited"):
         _ = open_store(store.path).campaign_text
-
-
-def add_line(store, event, **facts):
-    path = store.path / "journal.jsonl"
-    content = path.read_bytes()
-    path.write_bytes(content + encode(content.count(b"\n") + 1, "2026-01-01T00:00:00.000Z", event, facts))
-
-
-@pytest.mark.parametrize("event", ["created", "part"])
-def test_a_line_that_no_engine_writes_is_refused_with_its_number(store, event):
-    filled(store)
-    lines = {entry.event: entry for entry in store.notes()}
-    other = {"first": 5} if event == "part" else {}
-    add_line(store, event, **{**lines[event].facts, **other})
-    with pytest.raises(StoreError, match=rf"line 6: damaged, '{event}' as no engine writes it"):
-        open_store(store.path)
-    assert any("line 6: damaged" in sentence for sentence in damage(store.path))
 
 
 def test_a_run_whose_extension_is_lost_has_the_cases_that_it_flew(store):
