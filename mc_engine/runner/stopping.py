@@ -74,7 +74,7 @@ def refuse_undecidable(campaign: Campaign) -> None:
     if campaign.design != DESIGN:
         message = f'cases of "{campaign.design}" are not independent, as interim analyses need; use "{DESIGN}", '
         problems.append(Problem("campaign.design", f"{message}or fly all cases"))
-    if campaign.upstream is not None or campaign.first is not None:
+    if campaign.upstream is not None:
         problems.append(Problem("inputs", "there are as many cases as the run upstream has; fly all cases"))
     if problems:
         raise CampaignError(campaign.name, problems)
