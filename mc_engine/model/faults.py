@@ -20,6 +20,7 @@ from typing import Any
 
 from mc_engine.errors import EngineError, ModelError
 from mc_engine.lanes.number import Origin
+from mc_engine.model.files import sources_in
 from mc_engine.suggestions import hint, nearest
 from mc_engine.units import UNITS, unit_suffix
 
@@ -84,7 +85,7 @@ def _hint_of_module(error: Exception) -> str:
     if not isinstance(error, ModuleNotFoundError) or frame is None or frame.f_code.co_name == "<module>":
         return ""
     beside = Path(frame.f_code.co_filename).parent / str(error.name)
-    found = beside.is_dir() or beside.with_name(f"{beside.name}.py").is_file()
+    found = any(sources_in(beside)) or beside.with_name(f"{beside.name}.py").is_file()
     return "; it lies beside the file: import it at the top, not in a function" if found else ""
 
 

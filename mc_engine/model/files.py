@@ -11,6 +11,7 @@ from mc_engine.durable_file import open_regular
 from mc_engine.errors import StoreError
 
 _LONGEST_NAME = 60  # written out in one
+_OF_RUN = "journal.jsonl"  # a folder with it is a run directory, see store.run_files
 
 
 class FileFault(Exception):
@@ -38,6 +39,12 @@ def resolve_beside(directory: Path, reference: str, owner: str = "the campaign f
     if not is_file:
         raise FileFault(f"there is no file {name} beside {owner}")
     return home / os.path.normpath(reference)
+
+
+def sources_in(folder: Path) -> Iterator[Path]:
+    """The Python files of a folder and of those in it, without the copies of sources that a run directory keeps."""
+    runs = [journal.parent for journal in folder.rglob(_OF_RUN)]
+    return (file for file in folder.rglob("*.py") if not any(file.is_relative_to(run) for run in runs))
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from types import ModuleType
 
 from mc_engine.errors import ModelError
 from mc_engine.lanes.physics_function import PhysicsFunction
-from mc_engine.model.files import FileFault, resolve_beside
+from mc_engine.model.files import FileFault, resolve_beside, sources_in
 from mc_engine.model.imports import PACKAGES, USER, CapturedLoader, importable, new_module
 from mc_engine.model.syntax_tree import curve_files, data_names, imported_names
 
@@ -122,7 +122,7 @@ def sources_beside(file: Path) -> dict[Path, bytes]:
     while waiting:
         for root in {name.split(".")[0] for name in imported_names(contents[waiting.pop()])} - seen - {""}:
             seen.add(root)
-            package = _contents((file.parent / root).rglob("*.py"))
+            package = _contents(sources_in(file.parent / root))
             contents |= package
             waiting += [*package, *([beside] if (beside := file.parent / f"{root}.py") in contents else [])]
     return dict(sorted(contents.items()))

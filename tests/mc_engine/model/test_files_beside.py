@@ -274,3 +274,12 @@ def test_a_run_stands_alone_whatever_way_the_campaign_names_its_files(model, fil
     assert damage(tmp_path / "flown") == []
     assert replay(tmp_path / "flown", 3).equal
     assert extend(tmp_path / "flown", 12, workers=1).n_cases == 12
+
+
+def test_a_run_directory_with_the_name_of_an_imported_module_is_no_source(tmp_path):
+    """As after `run rocketpy.toml --out rocketpy` of a simulator that imports RocketPy."""
+    folder = campaign_in(tmp_path, BESIDE, "from dynamics import pull")
+    campaign = load_campaign(folder / "campaign.toml", cases=2)
+    run(campaign, folder / "dynamics")
+    assert (folder / "dynamics" / "model.py").exists()
+    assert source_digest(load_campaign(folder / "campaign.toml").model, None) == source_digest(campaign.model, None)
