@@ -111,6 +111,9 @@ def run(
     refuse_occupied_folder(path)
     options = _worker_options(path, workers, backend, scheduler, case_seconds, memory, patience, publish)
     publisher = _publisher(path, publish)
+    if campaign.sensitivity is not None and shard is None:  # the progress counts them, whatever --cases says
+        flights = f"{campaign.sensitivity.flights:,} further cases"
+        typer.echo(f"{flights} are flown for the contributions of the inputs, see [sensitivity]", err=True)
     if until is None:
         piece = _shard(shard)
         store = _with_progress(

@@ -125,17 +125,18 @@ def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE"
     from mc_engine.studies.replay_files import write_replay
 
     flight = runner.replay(folder, case)
-    if store.manifest.get("quantities"):  # a simulator without outputs has no history
-        for path in write_replay(store, case, flight.history, replay_picture(store, case, flight.history)):
-            typer.echo(str(path))
     if flight.lost:
         typer.echo(flight.lost)
     if not flight.equal:
         for difference in flight.differences:
             typer.echo(str(difference), err=True)
-        leave(DAMAGED, f"case {case} is not the one in {folder}: the run was changed, or flown by other sources")
-    if flight.tolerance is None:
+    elif flight.tolerance is None:
         typer.echo(f"case {case}: every stored number has the same bits")
     else:
         within = f"within the tolerance of its simulator, {flight.tolerance:g} of the number"
         typer.echo(f"case {case}: every stored number is {within}; bits were not compared")
+    if store.manifest.get("quantities"):  # a simulator without outputs has no history
+        for path in write_replay(store, case, flight.history, replay_picture(store, case, flight.history)):
+            typer.echo(str(path))
+    if not flight.equal:
+        leave(DAMAGED, f"case {case} is not the one in {folder}: the run was changed, or flown by other sources")

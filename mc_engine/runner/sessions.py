@@ -9,12 +9,13 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from numbers import Integral
 
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.sensitivity_design import DESIGN as PICK_FREEZE
 from mc_engine.campaign.sensitivity_design import companion, sensitivity_record
 from mc_engine.durable_file import remove_file
-from mc_engine.errors import DiskError, RunInterrupted, StoreError, WorkersLost
+from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError, WorkersLost
 from mc_engine.flight.chunks import NOMINAL_TASK, Task, chunk_size, rerun_tasks
 from mc_engine.flight.flyer import Flyer
 from mc_engine.flight.flyers import flyer_of
@@ -50,7 +51,12 @@ class Session:
 def session_of(
     progress: ProgressCall | None, workers: int | None, chunk: int | None, backend: Backend | str
 ) -> Session:
-    """A session from the arguments of the runner's functions."""
+    """A session from the arguments of the runner's functions; EngineError for one that nothing can be flown with."""
+    for name, number in (("workers", workers), ("chunk", chunk)):
+        if number is not None and not (isinstance(number, Integral) and number >= 1):
+            raise EngineError(f"{name}: {number!r} is not allowed; it must be a whole number from 1 on, or None")
+    if progress is not None and not callable(progress):
+        raise EngineError(f"progress: {progress!r} is no function of (cases done, cases wanted, cases failed)")
     backend = Backend(backend) if isinstance(backend, str) else backend
     return Session(progress, workers or os.cpu_count() or 1, chunk, backend)
 

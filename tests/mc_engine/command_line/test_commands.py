@@ -224,6 +224,12 @@ def test_extend_takes_the_new_number_of_cases(here, calls):
     fails_with(2, call("extend", "flown", "--cases", 60), "flown: has 60 cases; give the number it is to have in all")
 
 
+def test_a_run_tells_of_the_further_cases_that_its_contributions_take(here, calls):
+    (here / "model.py").write_text(MODEL)
+    (here / "campaign.toml").write_text(CAMPAIGN + "\n[sensitivity]\ncases = 32\n")
+    assert "96 further cases are flown for the contributions of the inputs" in call("run", "campaign.toml").stderr
+
+
 def test_replay_says_that_the_bits_agree_and_leaves_history_and_picture(here, calls):
     small_store(here / "flown")
     result = call("replay", "flown", 17)
@@ -234,6 +240,14 @@ def test_replay_says_that_the_bits_agree_and_leaves_history_and_picture(here, ca
     assert table.attrs["units"]["force_n"] == "N"
     assert (here / "flown" / "replay" / "case-17.png").read_bytes().startswith(b"\x89PNG")
     assert damage(here / "flown") == []
+
+
+def test_replay_tells_its_comparison_also_where_the_history_cannot_be_written(here, calls):
+    small_store(here / "flown")
+    (here / "flown" / "replay").write_text("")
+    result = call("replay", "flown", 17)
+    assert "case 17: every stored number has the same bits" in result.stdout
+    fails_with(5, result, "flown/replay: is no folder")
 
 
 def test_replay_of_a_case_with_other_bits_names_them_and_exits_with_5(here, calls):

@@ -15,7 +15,7 @@ from mc_engine import load_campaign, open_store
 from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.search import SHIPPED
 from mc_engine.campaign.sections import HistoriesSection
-from mc_engine.errors import CampaignError, ModelError, RunInterrupted, StoreError
+from mc_engine.errors import CampaignError, EngineError, ModelError, RunInterrupted, StoreError
 from mc_engine.flight.flight import fly
 from mc_engine.model import FixedStep
 from mc_engine.runner import manifest, runner
@@ -252,6 +252,13 @@ def test_the_campaign_as_run_and_its_files_stand_in_the_run_directory(flown):
     assert str(flown.path.parent) not in text
     assert os.path.expanduser("~") + "/" not in text
     assert {note.event for note in flown.notes()} >= {"started", "finished"}
+
+
+@pytest.mark.parametrize("wrong", [{"progress": True}, {"workers": 0}, {"workers": "2"}, {"chunk": -5}])
+def test_arguments_that_nothing_can_be_flown_with_are_refused_before_a_run_is_made(wrong, tmp_path):
+    with pytest.raises(EngineError, match=f"^{next(iter(wrong))}: {next(iter(wrong.values()))!r} is "):
+        runner.run(load_campaign("minimal", cases=2), tmp_path / "run", **wrong)
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_model_that_breaks_while_preparing_is_named_with_its_cases(tmp_path):
