@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mc_engine.errors import ModelError
 from mc_engine.model.fields import (
     DIRECTIONS,
+    EXTREMA,
     AdaptiveStep,
     Event,
     FixedStep,
@@ -55,6 +56,8 @@ def refuse_contradictions(model: "Model") -> None:
         if extremum.quantity not in outputs:
             near = hint(extremum.quantity, outputs)
             raise ModelError(f'extremum "{extremum.name}": there is no output "{extremum.quantity}"{near}')
+        if extremum.kind not in EXTREMA:
+            raise ModelError(f'extremum "{extremum.name}" has the kind "{extremum.kind}"; known are {listed(EXTREMA)}')
     if model.control is not None and model.start is None:
         raise ModelError("the model has `control`, but no `memory`; give memory=Memory, a named tuple with a default "
                          "for each field, or write start(p, o), which gives the first one")  # fmt: skip

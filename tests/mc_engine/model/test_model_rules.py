@@ -1,10 +1,14 @@
 """Records of a model that contradict themselves or one another: named where the model is made."""
 
+from dataclasses import replace
+
 import pytest
 from mistaken_campaign import campaign_with, given, in_front, refused, with_evaluate, with_input
 
-from mc_engine.errors import CampaignError
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.errors import CampaignError, ModelError
 from mc_engine.flight.contract import breaches
+from mc_engine.model import Extremum
 
 IMPORTS = "from mc_engine.lanes import"
 CLOCK = "FixedStep(step=10.0, until=10_000.0)"
@@ -62,6 +66,12 @@ CONTRADICTIONS = {
 def test_a_contradiction_is_named_where_the_model_is_made(tmp_path):
     for mistake, (*edits, sentence) in CONTRADICTIONS.items():
         refused(tmp_path / mistake, edits, sentence, "MODEL = model(")
+
+
+def test_a_record_of_an_extremum_of_no_known_kind_is_refused():
+    top = Extremum("top", "speed_m_s", "maximum")
+    with pytest.raises(ModelError, match='"top" has the kind "maximum"; known are "max", "min", "last_above"'):
+        replace(load_campaign("minimal").model, extrema=(top,))
 
 
 def test_a_name_that_physics_does_not_know_gets_its_fix(tmp_path):
