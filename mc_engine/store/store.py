@@ -117,6 +117,9 @@ class Store:
         self.columns = columns_in(self.manifest)
         self._counted.begin_with(self.manifest["campaign"]["cases"])
 
+    def __repr__(self) -> str:
+        return f"Store({str(self.path)!r})"
+
     def _original(self, name: str, fact: str) -> bytes:
         content = disk.read_short(self.path / name)
         if sha256(content).hexdigest() != self._created[fact]:

@@ -41,6 +41,10 @@ def test_the_table_is_the_same_however_the_cases_were_cut_and_ordered(tmp_path_f
     assert store.missing(45) == [(40, 45)]
 
 
+def test_a_store_shows_its_folder(store):
+    assert repr(store) == f"Store('{store.path}')"
+
+
 def test_the_table_carries_units_and_meanings(store):
     table = filled(store).cases()
     assert table.attrs["units"]["propellant_kg"] == "kg"
