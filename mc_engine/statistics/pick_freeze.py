@@ -91,7 +91,7 @@ def whole_blocks(case_ids: np.ndarray, size: int) -> np.ndarray:
     """int64[n_blocks, size]: places of the cases of each block that is there as a whole."""
     order = np.argsort(case_ids, kind="stable")
     block = case_ids[order] // size
-    whole = np.bincount(block, minlength=1)[block] == size if block.size else np.zeros(0, dtype=bool)
+    whole = np.bincount(block)[block] == size if block.size else np.zeros(0, dtype=bool)
     return order[whole].reshape(-1, size)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.stats import binomtest, fisher_exact, norm
+from scipy.stats import binomtest, fisher_exact, levene, multinomial, norm, rankdata, ttest_rel, wilcoxon
 
 from mc_engine.sampling.streams import uniforms
 from mc_engine.statistics import change_tests
@@ -43,6 +43,45 @@ def test_of_a_hundred_comparisons_a_shift_of_three_tenths_of_sigma_is_found_in_9
         found += holm(np.ravel(shifted))[4] <= ALPHA
     assert found >= 99
     assert alarms <= 1
+
+
+@pytest.mark.parametrize("paired", [False, True])
+def test_p_values_are_those_of_scipy_and_the_ends_of_intervals_those_that_the_tests_just_reject(paired):
+    """Of the shift also as (n - 1) r^2, for the correlation r of normal scores with the run; pairs by Wilcoxon."""
+    a, own = normal("a", 3, 60), normal("b", 3, 60 if paired else 45)
+    b = 1.3 * (0.8 * a + 0.6 * own if paired else own) + 0.2
+    found = metric_change("y", a, b, paired=paired, confidence=0.9)
+    assert found.mean == pytest.approx((a.mean(), b.mean()), rel=1e-12)
+    assert found.deviation == pytest.approx((a.std(ddof=1), b.std(ddof=1)), rel=1e-12)
+
+    def shift_p(shift):
+        if paired:
+            return wilcoxon(b - shift - a, correction=False, method="asymptotic").pvalue
+        scores = norm.ppf(rankdata(np.concatenate([a, b - shift])) / (a.size + b.size + 1))
+        run = np.arange(scores.size) >= a.size
+        return 2.0 * norm.sf(np.sqrt(scores.size - 1) * abs(np.corrcoef(scores, run)[0, 1]))
+
+    def spread_p(ratio):
+        before, after = (np.abs(values - np.median(values)) for values in (a, b))
+        rescaled = np.median(b) + (b - np.median(b)) / ratio
+        return ttest_rel(after / ratio, before).pvalue if paired else levene(a, rescaled, center="median").pvalue
+
+    assert (found.shift_p, found.spread_p) == pytest.approx((shift_p(0.0), spread_p(1.0)), rel=1e-9)
+    for end, outside in ((found.shift.lower, -1e-4), (found.shift.upper, 1e-4)):
+        assert shift_p(end + outside) <= 0.1 <= shift_p(end - outside)
+    assert [spread_p(found.ratio.lower), spread_p(found.ratio.upper)] == pytest.approx([0.1, 0.1], rel=1e-6)
+    assert shift_p(found.shift.value) > 0.9
+    assert spread_p(found.ratio.value) == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("paired", [False, True])
+def test_fewer_than_ten_cases_have_a_shift_of_means_without_bounds_and_no_test(paired):
+    a, b = normal("a", 3, 9), normal("b", 3, 9)
+    found = metric_change("y", a, b, paired=paired)
+    assert found.shift.value == pytest.approx(b.mean() - a.mean(), rel=1e-12)
+    assert (found.shift.lower, found.shift.upper) == (-np.inf, np.inf)
+    assert np.isnan([found.shift_p, found.spread_p, found.ratio.value]).all()
+    assert np.isfinite(metric_change("y", normal("a", 3, 10), normal("b", 3, 10), paired=paired).shift_p)
 
 
 @pytest.mark.parametrize("paired", [False, True])
@@ -110,6 +149,17 @@ def test_a_paired_share_is_mcnemars_and_an_unpaired_one_fishers():
     assert free.p_value == pytest.approx(fisher_exact([[190, 10], [176, 24]]).pvalue)
     assert free.difference.lower < -14 / 200 < free.difference.upper
     assert np.isnan(share_change("inside", a[:0], b, paired=False).p_value)
+
+
+@pytest.mark.parametrize(("lost", "gained"), [(0.1, 0.2), (0.3, 0.05)])
+def test_the_interval_of_a_paired_share_holds_the_true_difference_as_often_as_it_says(lost, gained):
+    """All outcomes of 60 pairs with their probabilities."""
+    outcomes = [(k, m) for k in range(61) for m in range(61 - k)]
+    chance = multinomial.pmf([(k, m, 60 - k - m) for k, m in outcomes], 60, [lost, gained, 1.0 - lost - gained])
+    found = [change_tests._paired_share(k, m, 60, 0.95) for k, m in outcomes]
+    held = [one.lower <= gained - lost <= one.upper for one in found]
+    assert all(-1.0 <= one.lower < one.upper <= 1.0 for one in found)
+    assert chance @ held == pytest.approx(0.95, abs=0.006)
 
 
 def test_newcombes_interval_is_the_printed_one():

@@ -26,6 +26,24 @@ def test_the_running_mean_is_that_of_the_first_cases_with_students_interval():
         assert (found.lower[place], found.upper[place]) == pytest.approx((low, high), abs=1e-8)
 
 
+def test_the_running_quantile_is_that_of_the_first_cases_with_wilks_interval():
+    """At each place numpy's quantile and ranks from binomial sums; the halves by Fisher's exact test, either side."""
+    values, share = draws(3000), 0.9
+    found = running_quantile(values, share, 0.95)
+    for place in (10, -1):
+        part = np.sort(values[: found.cases[place]])
+        below = stats.binom.cdf(np.arange(part.size), part.size, share)  # P(B <= rank - 1)
+        ends = part[np.flatnonzero(below <= 0.025).max()], part[np.flatnonzero(below >= 0.975).min()]
+        assert found.estimate[place] == pytest.approx(np.quantile(part, share, method="median_unbiased"), abs=1e-8)
+        assert (found.lower[place], found.upper[place]) == ends
+    estimate = found.estimate[-1]
+    assert found.reach == pytest.approx(max(estimate - ends[0], ends[1] - estimate) / values.std(ddof=1), rel=1e-9)
+    above = values > estimate
+    law = stats.hypergeom(values.size, above.sum(), 1500)
+    first = above[:1500].sum()
+    assert found.halves_p == pytest.approx(min(1.0, 2.0 * min(law.cdf(first), law.sf(first - 1))), rel=1e-9)
+
+
 def test_an_interval_close_enough_and_equal_halves_have_settled():
     assert not running_mean(draws(800)).settled
     assert running_mean(draws(800)).cases_wanted == pytest.approx(1.645**2 / 0.05**2, rel=0.03)

@@ -117,6 +117,13 @@ def test_success_along_an_input_counts_its_cases_and_has_exact_limits():
     assert (curve.lower[0], curve.upper[0]) == clopper_pearson(100, 100, 0.95)
 
 
+def test_a_number_of_few_values_has_a_bin_for_each_however_rare():
+    curve = success_along(np.repeat([1.0, 2.0, 5.0], [97, 2, 1]), np.arange(100) < 98)
+    assert (curve.middle.tolist(), curve.tried.tolist()) == ([1.0, 2.0, 5.0], [97, 2, 1])
+    assert curve.passed.tolist() == [97, 1, 0]
+    assert (curve.lower[1], curve.upper[1]) == clopper_pearson(1, 2, 0.95)
+
+
 @pytest.mark.parametrize("shape", [0, 1, 200, (60, 3)])
 def test_ranks_and_adjusted_p_values_are_those_of_scipy(shape):
     draw = np.random.Generator(np.random.Philox(key=9))

@@ -30,5 +30,11 @@ def test_the_long_axis_points_where_the_cloud_does():
     assert np.degrees(found.ellipses[0].direction) == pytest.approx(60.0, abs=0.5)  # from east to north
 
 
+def test_a_footprint_reaches_to_its_farthest_place_and_no_farther_than_a_plane_shows():
+    ends = np.array([[4.99e6, 0.0], [-4.99e6, 0.0], [0.0, 1e6], [0.0, -1e6]])
+    assert footprint(*LocalPlane(0.0, 30.0).places(ends)).reach == pytest.approx(4.99e6, abs=1.0)
+    assert footprint(*LocalPlane(0.0, 30.0).places(ends * 5.01 / 4.99)) is None
+
+
 def test_places_across_the_planet_are_no_footprint():
     assert footprint(np.array([0.0, 0.0, 60.0]), np.array([0.0, 100.0, 50.0])) is None

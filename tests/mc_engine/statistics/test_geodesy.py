@@ -22,6 +22,12 @@ def test_a_quarter_meridian_has_its_length():
     assert east == pytest.approx(0.0, abs=MILLIMETRE)
 
 
+# of the module's first page: (s/R) / sin(s/R) is 1.001 at 500 km and 1.017 at 2000 km from the middle
+@pytest.mark.parametrize(("distance", "stretch"), [(0.0, 0.0), (500e3, 0.001), (2000e3, 0.017)])
+def test_lengths_across_are_too_large_by_the_stated_factor(distance, stretch):
+    assert LocalPlane(40.0, 0.0).stretch(distance) == pytest.approx(stretch, abs=5e-4)
+
+
 def test_places_come_back_from_the_plane():
     draw = np.random.Generator(np.random.Philox(key=1))
     latitude, longitude = draw.uniform(-89.0, 89.0, 200), draw.uniform(-180.0, 180.0, 200)

@@ -43,6 +43,6 @@ def test_pairs_without_a_number_are_counted_and_not_used():
     found = paired_difference(np.array([1.0, np.nan, np.inf]), np.array([2.0, 1.0, 1.0]))
     assert (found.n_used, found.n_tried, found.smaller) == (1, 3, 1)
     nothing = paired_difference(np.array([np.nan]), np.array([1.0]))
-    assert (nothing.n_used, nothing.median, nothing.smaller_share) == (0, None, None)
+    assert (nothing.n_used, nothing.median, nothing.smaller, nothing.smaller_share) == (0, None, 0, None)
     assert paired_difference(np.zeros(0), np.zeros(0)).n_tried == 0
     assert found.smallest == pytest.approx(-1.0)

@@ -11,6 +11,7 @@ from scipy import stats
 from scipy.special import log_ndtr, ndtri
 
 from mc_engine.sampling.streams import uniforms
+from mc_engine.statistics import clopper_pearson
 from mc_engine.statistics.importance_sampling import cross_entropy
 from mc_engine.statistics.rare_events import interval_of_mean
 from mc_engine.statistics.subset_simulation import subset_simulation
@@ -194,6 +195,44 @@ def test_upper_ends_hold_where_few_cases_leave_some_runs_without_a_failure():
         for seed in range(40)
     ]
     assert sum(event.upper < p for event in events) <= 4
+
+
+def test_the_interval_on_the_mean_of_runs_is_coxs_with_the_stated_allowance():
+    """Olsson (2005), modified Cox: mean log + s^2/2 +- t sqrt(s^2/n + s^4 / (2 (n - 1))), here 1.2 times as far."""
+    estimates = np.array([1.0, 2.0, 4.0, 8.0]) * 1e-6  # logarithms with variance 5/3 (ln 2)^2
+    variance = 5.0 / 3.0 * math.log(2.0) ** 2
+    centre = math.log(math.sqrt(8.0) * 1e-6) + 0.5 * variance
+    reach = 1.2 * 2.353363 * math.sqrt(variance / 4.0 + variance**2 / 6.0)  # t with 3 degrees of freedom, 95 %
+    assert interval_of_mean(estimates, 0.9) == pytest.approx((math.exp(centre - reach), math.exp(centre + reach)))
+    with_zero = np.array([0.0, 1.0, 2.0, 3.0])  # Student's, cut at zero: 1.5 +- 1.2 t sqrt(5/3 / 4)
+    reach = 1.2 * 2.353363 * math.sqrt(5.0 / 12.0)
+    assert interval_of_mean(with_zero, 0.9) == pytest.approx((0.0, 1.5 + reach))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_frequent_failures_are_those_of_so_many_plain_cases(method):
+    event = METHODS[method][0](lambda u: 0.3 - u[:, 0], 2, cases_per_level=1_000, seed=1, confidence=0.9)
+    failed = int(event.cases.failed.sum())
+    assert (event.method, event.n_cases, event.probability) == ("plain", 1000, failed / 1000)
+    assert (event.lower, event.upper) == clopper_pearson(failed, 1000, 0.9)
+    assert event.relative_error == pytest.approx(math.sqrt((1.0 - failed / 1000) / failed), rel=1e-12)
+    assert event.plain_cases == pytest.approx(1000, rel=1e-12)
+
+
+def test_the_interval_of_importance_sampling_is_that_of_the_mean_of_its_weights():
+    event = cross_entropy(plane, 2, cases_per_level=1_000, seed=3, confidence=0.9)
+    cases = event.cases
+    last = cases.level == cases.level.max()
+    weight = 1000 * (cases.weight * cases.failed)[last]
+    assert (last.sum(), cases.weight[~last].sum()) == (1000, 0.0)
+    error = stats.sem(weight) / weight.mean()
+    reach = math.exp(1.2 * 1.6448536 * error)  # the stated allowance
+    told = event.probability, event.relative_error, event.lower, event.upper
+    assert told == pytest.approx((weight.mean(), error, weight.mean() / reach, weight.mean() * reach), rel=1e-6)
+    density = np.exp(-0.5 * (cases.u[last] ** 2).sum(axis=1)) / (2.0 * math.pi)
+    drawn = density / (1000 * cases.weight[last])  # what the cases were drawn from, a density: its mean reciprocal
+    inside = np.abs(cases.u[last] - [2.6, 2.6]).max(axis=1) < 0.4  # in a box is the area of the box
+    assert np.mean(inside / drawn) == pytest.approx(0.64, rel=0.2)
 
 
 def test_the_interval_on_the_mean_of_log_normal_estimates_holds_it():

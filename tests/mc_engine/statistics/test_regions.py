@@ -76,6 +76,7 @@ def test_a_region_of_any_shape_is_smaller_than_the_ellipse_of_a_bent_cloud():
     points = ring(4000, key=1)
     corners = np.random.Generator(np.random.Philox(key=2)).uniform(-13.0, 13.0, (20_000, 2))
     region = density_regions(points, (0.9,))[0]
+    assert region.density.at(np.concatenate(region.outlines)) == pytest.approx(region.level, rel=1e-6)
     ellipse = covariance_ellipses(points, (0.9,))[0]
     assert (region.density.at(corners) >= region.level).mean() < 0.8 * np.pi * np.prod(ellipse.semi_axes) / 26.0**2
     assert region.outlines[0][0] == pytest.approx(region.outlines[0][-1])

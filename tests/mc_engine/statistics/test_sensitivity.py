@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.stats import rankdata, spearmanr
 
 from mc_engine.sampling.streams import uniforms
-from mc_engine.statistics.first_order import first_order
+from mc_engine.statistics.first_order import contributors, first_order
 from mc_engine.statistics.input_columns import input_columns
 from mc_engine.statistics.sensitivity import sensitivity
 
@@ -28,6 +29,47 @@ def test_squared_coefficients_of_a_linear_model_are_its_shares_of_variance():
     assert indices.r_squared[0] == pytest.approx(1.0, abs=1e-9)
     assert indices.src[:, 0] ** 2 == pytest.approx([9 / 13, 4 / 13, 0.0], abs=0.03)  # the draws' own covariance
     assert indices.prcc[:2, 0] == pytest.approx([1.0, -1.0], abs=0.1)
+
+
+def test_trends_are_those_of_scipy_least_squares_and_the_inverse_correlation_of_ranks():
+    """Of noisy cases with correlated inputs; partial correlation -P_ij / sqrt(P_ii P_jj) of the precision matrix."""
+    a, b, c, noise = np.random.Generator(np.random.Philox(key=2)).normal(size=(4, 60))
+    x = np.column_stack([a, b + 0.5 * a, c])
+    y = np.exp(x @ [0.5, -0.3, 0.0] + 0.4 * noise)
+    found = sensitivity(named(x.T), {"y": y, "again": y, "other": noise})
+    slope, left, *_ = np.linalg.lstsq(x - x.mean(axis=0), y - y.mean())
+    ranks = rankdata(np.column_stack([x, y]), axis=0)
+    precision = np.linalg.inv(np.corrcoef(ranks.T))
+    assert found.src[:, 0] == pytest.approx(slope * x.std(axis=0) / y.std(), rel=1e-9)
+    assert found.r_squared[0] == pytest.approx(1.0 - left[0] / (y.size * y.var()), rel=1e-9)
+    assert found.spearman[:, 0] == pytest.approx([spearmanr(column, y).statistic for column in x.T], rel=1e-9)
+    assert found.prcc[:, 0] == pytest.approx(-precision[:3, 3] / np.sqrt(precision.diagonal()[:3] * precision[3, 3]))
+    assert found.prcc[:, 1] == pytest.approx(found.prcc[:, 0], rel=1e-12)
+
+
+def test_an_input_or_a_metric_that_does_not_vary_has_no_index_and_changes_none():
+    (a,), noise = draws(1, 300), draws(2, 300)[1]
+    alone = sensitivity({"a": a}, {"y": a + noise})
+    found = sensitivity({"same": np.full(300, 7.0), "a": a}, {"y": a + noise, "constant": np.full(300, 0.1)})
+    for index in ("spearman", "src", "prcc", "first_order", "first_order_error", "total", "total_error"):
+        values = getattr(found, index)
+        assert values[1, 0] == pytest.approx(getattr(alone, index)[0, 0], rel=1e-9), index
+        assert np.isnan([*values[0], values[1, 1]]).all(), index
+    assert found.correlated is None
+
+
+def test_contributors_come_strongest_first_and_without_a_share_where_nothing_can_be_told():
+    (weak, strong), same = draws(2, 400), np.full(400, 7.0)
+    inputs, y = {"weak": weak, "same": same, "strong": strong}, weak + 3.0 * strong
+    y[5] = np.nan
+    found = contributors(inputs, y)
+    assert [one.name for one in found] == ["strong", "weak"]
+    assert [one.share for one in found] == pytest.approx([0.9, 0.1], abs=0.04)
+    for few in (np.where(np.arange(400) < 19, y + 0.0, np.nan), np.where(np.isfinite(y), 0.1, np.nan)):
+        untold = contributors(inputs, few)
+        assert [one.name for one in untold] == ["weak", "strong"]
+        assert np.isnan([one.share for one in untold]).all()
+    assert np.isnan(first_order(*input_columns({"same": same}), strong[:, None])).all()
 
 
 def test_first_order_indices_of_ishigami_lie_within_two_hundredths():

@@ -20,6 +20,14 @@ def test_moments_are_those_of_numpy():
     assert summary.sd == pytest.approx(values.std(ddof=1), rel=1e-13)
 
 
+@pytest.mark.parametrize(
+    ("values", "sd"),
+    [([7.0], None), ([1.0, 3.0], 2.0**0.5), ([2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0], (32 / 7) ** 0.5)],
+)
+def test_the_deviation_of_a_few_values_is_that_of_the_textbook(values, sd):
+    assert summarize(np.array(values)).sd == (None if sd is None else pytest.approx(sd, rel=1e-15))
+
+
 def test_a_constant_metric_keeps_its_bits_and_has_no_spread():
     summary = summarize(np.full(10_001, 0.1))
     assert summary.constant

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import spearmanr
 
 from mc_engine.sampling.streams import uniforms
 from mc_engine.statistics.sensitivity import sensitivity
@@ -104,8 +105,9 @@ def test_an_input_without_effect_is_seldom_called_acting_and_one_with_an_effect_
 
 def test_correlated_inputs_have_no_total_index():
     x = draws(3)
-    again = {**x, "x3": x["x0"] + 0.5 * x["x1"]}
+    again = {"x0": x["x0"], "x3": x["x0"] + 0.5 * x["x1"]}
     indices = sensitivity(again, {"y": x["x0"] + x["x2"]})
+    assert indices.correlated == ("x0", "x3", pytest.approx(spearmanr(*again.values()).statistic, rel=1e-12))
     assert np.isnan(indices.total).all()
     assert np.isnan(indices.unexplained).all()
     assert np.isfinite(indices.first_order).all()
