@@ -4,6 +4,7 @@ from scipy.stats import spearmanr
 
 from mc_engine.sampling.correlation import (
     gaussian_copula,
+    group_matrix,
     iman_conover,
     is_positive_definite,
 )
@@ -18,6 +19,12 @@ def _independent(n_cases, n_columns=3):
 
 def _hypercube(n_cases, n_columns=3):
     return [(np.argsort(u) + 0.5) / n_cases for u in _independent(n_cases, n_columns)]
+
+
+def test_the_matrix_of_a_group_has_its_members_in_their_order_whichever_way_pairs_are_written():
+    members, matrix = group_matrix(("a", "b", "c", "d"), [("d", "a", 0.5), ("a", "c", -0.3)])
+    assert members == (0, 2, 3)
+    assert matrix.tolist() == [[1.0, -0.3, 0.5], [-0.3, 1.0, 0.0], [0.5, 0.0, 1.0]]
 
 
 def test_the_copula_reaches_the_rank_correlations_asked_for():

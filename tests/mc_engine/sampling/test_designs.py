@@ -43,6 +43,37 @@ def test_a_thousand_cases_extended_to_two_thousand_are_a_fresh_two_thousand(desi
     assert np.concatenate([first, later], axis=1).tobytes() == fresh.tobytes()
 
 
+# Written down once, as the numbers of `test_streams`: of cases 0, 1 and 17 of 20 with seed 20160421.
+CONTRACT = {
+    "mc": [[0.39567765469958927, 0.8556476477968407, 0.4239227037302796],
+           [0.2311132163418289, 0.235535356607942, 0.047209818952994476]],
+    "lhs": [[0.2697838827349795, 0.34278238238984204, 0.921196135186514],
+            [0.06155566081709145, 0.9617767678303972, 0.6023604909476498]],
+    "sobol": [[0.5067717955830132, 0.27434764416872026, 0.3138378113866319],
+              [0.8851065391956012, 0.11286831295862498, 0.37288007806402224]],
+    "saltelli": [[0.8335848665160742, 0.08808014579817847, 0.27051445727870693],
+                 [0.4118938641508044, 0.4118938641508044, 0.6952603224920023]],
+    "morris": [[0.125, 0.125, 0.625], [0.625, 0.125, 0.375]],
+}  # fmt: skip
+CORRELATED = {  # of the second dispersion, with a rank correlation of 0.5 to the first one
+    "mc": [0.22184816903557802, 0.47310533724808357, 0.06296686562879909],
+    "lhs": [0.06155566081709145, 0.9451488353944104, 0.9617767678303972],
+    "sobol": [0.8499650337355082, 0.08900271129850706, 0.2985864679769545],
+}
+
+
+@pytest.mark.parametrize("design", CONTRACT)
+def test_the_numbers_of_a_design_are_those_of_the_seed_contract(design):
+    def drawn(pairs=()):
+        return _cube(design, [0, 1, 17], 20, 20160421, ("ve_pct", "oe_deg"), pairs).tolist()
+
+    assert drawn() == CONTRACT[design]
+    if design in RANDOM:
+        first, second = drawn((("oe_deg", "ve_pct", 0.5),))
+        assert first == CONTRACT[design][0]
+        assert second == pytest.approx(CORRELATED[design], rel=1e-13)
+
+
 @pytest.mark.parametrize("design", RANDOM)
 def test_a_dispersion_added_at_the_end_changes_no_other_number(design):
     before = _cube(design, range(300))

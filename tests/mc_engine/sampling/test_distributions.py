@@ -18,6 +18,7 @@ from mc_engine.sampling.distributions import (
     Uniform,
     quantiles,
     share_outside,
+    truncate,
 )
 
 # Ours, and the same distribution in scipy's words.
@@ -97,6 +98,24 @@ def test_the_share_between_two_values_is_accurate_on_either_side(lower, width):
 def test_the_share_outside_a_range_counts_both_tails():
     three_sigma = 0.0026997960632601866  # 2 (1 - Phi(3)), Abramowitz & Stegun, table 26.1: 0.00270
     assert share_outside(Normal(0.0, 1.0), -3.0, 3.0) == pytest.approx(three_sigma, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(-0.5, 1.0), (-3.0, 1.0), (-0.5, 9.0), (-3.0, 9.0), (2.5, 3.0), (-4.0, -2.0)]
+)
+def test_the_share_outside_a_range_of_a_truncated_one_is_that_of_scipy(low, high):
+    law = stats.truncnorm(-1.0, 2.0)
+    ours = share_outside(Truncated(Normal(0.0, 1.0), -1.0, 2.0), low, high)
+    assert ours == pytest.approx(law.cdf(low) + law.sf(high), abs=1e-12)
+
+
+def test_what_is_cut_twice_lies_between_the_inner_bounds_and_those_of_its_base():
+    normal, waiting = Normal(0.0, 1.0), Exponential(3.0, 1.0)
+    assert truncate(normal, -1.0, math.inf).support == (-1.0, math.inf)
+    for outer, inner in (((-1.0, 2.0), (0.0, 5.0)), ((0.0, 5.0), (-1.0, 2.0))):
+        assert truncate(truncate(normal, *outer), *inner) == Truncated(normal, 0.0, 2.0)
+    assert truncate(waiting, 0.0, 4.0).support == (3.0, 4.0)
+    assert truncate(waiting, 3.5, math.inf).support == (3.5, math.inf)
 
 
 def test_spans_are_three_sigma_where_the_support_has_no_end():

@@ -6,7 +6,7 @@ from scipy import stats
 
 from mc_engine.sampling.streams import uniforms
 from mc_engine.statistics import clopper_pearson
-from mc_engine.statistics.drivers import _adjusted, failure_drivers, success_along
+from mc_engine.statistics.drivers import MOST_ROWS, _adjusted, _tested_rows, failure_drivers, success_along
 from mc_engine.statistics.input_columns import average_ranks
 
 
@@ -104,6 +104,28 @@ def test_words_and_switches_drive_by_their_levels():
     assert by_name["word"].where == ("coast",)
     assert by_name["word"].effect == pytest.approx(1.0 - ((word == "coast") & ~failed).sum() / (~failed).sum())
     assert by_name["switch"].where == ("yes",)
+
+
+def test_a_level_that_spares_cases_is_named_and_its_p_value_is_fishers():
+    """Fisher's exact test of each of three levels, doubled for its two sides, and times the number of levels."""
+    word = np.repeat(["aim", "burn", "coast"], 50)
+    failed = np.isin(np.arange(150), [*range(0, 50, 5), *range(51, 96, 5)])
+    (found,) = failure_drivers({"word": word}, {"limit": failed}).singles
+    assert (found.where, found.effect) == (("not coast",), pytest.approx(50 / 131))
+    assert found.p_value == pytest.approx(6.0 * stats.hypergeom.cdf(0, 150, 19, 50), rel=1e-9)
+
+
+def test_of_very_many_cases_all_failed_ones_are_tested_and_an_even_choice_of_the_others():
+    failed = np.zeros((2, 60_000), dtype=bool)
+    failed[0, 7::4000], failed[1, 11::3000] = True, True
+    usable = np.arange(60_000) != 7
+    rows = _tested_rows(failed, usable)
+    lost = np.flatnonzero(failed.any(axis=0) & usable)
+    assert np.isin(lost, rows).all()
+    assert rows.size == lost.size + MOST_ROWS // 2
+    assert (np.diff(rows) > 0).all()
+    assert np.diff(rows).max() <= 8
+    assert _tested_rows(failed[:, :MOST_ROWS], usable[:MOST_ROWS]).size == MOST_ROWS - 1
 
 
 def test_success_along_an_input_counts_its_cases_and_has_exact_limits():

@@ -36,10 +36,11 @@ def test_a_grid_with_a_failed_case_has_one_blank_node():
 
 def test_a_grid_flown_several_times_gives_means_and_their_standard_errors():
     grid_x, grid_y = (np.tile(values.ravel(), 4) for values in np.meshgrid(np.arange(3.0), np.arange(2.0)))
-    z = np.repeat([0.0, 1.0, 2.0, 3.0], 6)
+    z = 10.0 * grid_x + np.repeat([0.0, 1.0, 2.0, 3.0], 6)
     surface = map_metric(grid_x, grid_y, z)
     assert surface.cases_per_node == 4
-    assert surface.value == pytest.approx(np.full((2, 3), 1.5))
+    assert surface.value == pytest.approx(np.array([[1.5, 11.5, 21.5]] * 2))
+    assert surface.explained == pytest.approx(1.0 - (6 * 5.0 / 18) / z.var())  # within nodes 5 each, 24 - 6 free
     assert surface.error == pytest.approx(np.full((2, 3), np.std([0, 1, 2, 3], ddof=1) / 2.0))
 
 
@@ -51,6 +52,18 @@ def test_a_quadratic_surface_is_found_exactly_with_no_error():
     assert known.mean() > 0.4
     assert surface.value[known] == pytest.approx(truth[known], abs=1e-6)
     assert np.nanmax(surface.error) < 1e-6
+
+
+@pytest.mark.parametrize("power", [(3, 0), (2, 1), (1, 2), (0, 3)])
+def test_of_a_cubic_surface_the_error_is_what_the_quadratic_misses(power):
+    x, y = np.random.Generator(np.random.Philox(key=6)).uniform(-1.0, 1.0, (2, 400))
+    surface = map_metric(x, y, x ** power[0] * y ** power[1], points=15)
+    grid_x, grid_y = np.meshgrid(surface.x, surface.y)
+    off = np.abs(surface.value - grid_x ** power[0] * grid_y ** power[1])
+    known = np.isfinite(off)
+    assert known.mean() > 0.7
+    assert (off <= surface.error + 1e-9)[known].all()  # which the scatter about the quadratic adds to
+    assert np.median(surface.error[known]) < 2.0 * np.median(off[known]) + 0.01
 
 
 SURFACES = {

@@ -13,8 +13,8 @@ from scipy.special import log_ndtr, ndtri
 from mc_engine.sampling.streams import uniforms
 from mc_engine.statistics import clopper_pearson
 from mc_engine.statistics.importance_sampling import cross_entropy
-from mc_engine.statistics.rare_events import interval_of_mean
-from mc_engine.statistics.subset_simulation import subset_simulation
+from mc_engine.statistics.rare_events import Level, interval_of_mean
+from mc_engine.statistics.subset_simulation import Climb, _remarks, subset_simulation
 
 SEEDS = 50
 # Cases per level: fewer serve importance sampling.
@@ -115,6 +115,32 @@ def test_weights_of_the_failed_cases_add_up_to_the_probability(method):
     if method == "subset":  # chains keep the distribution, so any weighted mean is that of plain cases
         assert cases.weight.sum() == pytest.approx(1.0, rel=1e-12)
         assert cases.weight @ (cases.margin < 1.5) == pytest.approx(stats.norm.sf(2.0), rel=0.15)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_each_level_has_the_probability_of_its_margin(method):
+    event = METHODS[method][0](plane, 2, cases_per_level=2_000, seed=3, confidence=0.9)
+    exact = [stats.norm.sf(3.5 - level.margin) for level in event.levels]
+    assert [level.probability for level in event.levels] == pytest.approx(exact, rel=0.5)
+    assert sum(level.cases for level in event.levels) == event.n_cases
+    assert all(0.0 < level.accepted <= 1.0 for level in event.levels)
+    if method == "subset":  # the interval tells the variance s^2 of the logarithms of the runs (Cox), and so the error
+        reach = 0.5 * math.log(event.upper / event.lower) / (1.2 * stats.t.ppf(0.95, 9))
+        variance = 0.9 * (math.sqrt(1.0 + 20.0 * reach**2 / 0.9) - 1.0)
+        assert event.relative_error == pytest.approx(math.sqrt(variance / 10.0), rel=0.4)
+
+
+def test_runs_that_disagree_or_found_nothing_are_said():
+    def remarks_of(estimates, accepted=0.5):
+        return _remarks(Climb(None, None, (Level(0.0, 1.0, 10, 100, accepted),), None, False), np.array(estimates))
+
+    for least, found in ((3.4e-8, ""), (3.3e-8, "The runs disagree"), (0.0, "1 of 10 runs found no")):
+        remarks = " ".join(remarks_of([least, *9 * [1e-6]]))
+        assert remarks.startswith(found), least
+        assert bool(remarks) == bool(found)
+    assert remarks_of(10 * [0.0])[0].startswith("No case failed in 1 levels")
+    assert remarks_of(10 * [1.0], 0.051) == []
+    assert "only 4.9% of the steps" in remarks_of(10 * [1.0], 0.049)[0]
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -227,6 +253,7 @@ def test_the_interval_of_importance_sampling_is_that_of_the_mean_of_its_weights(
     assert (last.sum(), cases.weight[~last].sum()) == (1000, 0.0)
     error = stats.sem(weight) / weight.mean()
     reach = math.exp(1.2 * 1.6448536 * error)  # the stated allowance
+    assert event.levels[-1].accepted == pytest.approx(weight.sum() ** 2 / (weight @ weight) / 1000, rel=1e-9)  # Kish
     told = event.probability, event.relative_error, event.lower, event.upper
     assert told == pytest.approx((weight.mean(), error, weight.mean() / reach, weight.mean() * reach), rel=1e-6)
     density = np.exp(-0.5 * (cases.u[last] ** 2).sum(axis=1)) / (2.0 * math.pi)
