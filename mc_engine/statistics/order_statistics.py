@@ -72,7 +72,7 @@ def estimate_place(n: int, probability: float) -> float:
     return min(max((n + 1.0 / 3.0) * probability + 1.0 / 3.0, 1.0), float(n))
 
 
-def ranks_read(n: int, probability: float, confidence: float = 0.90) -> set[int]:
+def ranks_read(n: int, probability: float, confidence: float) -> set[int]:
     """The ranks (1 ... n) of the order statistics that `quantile` uses."""
     place = estimate_place(n, probability)
     return {floor(place), ceil(place), *(rank for rank in quantile_ranks(n, probability, confidence) if rank)}
@@ -96,7 +96,7 @@ def quantile(ordered: np.ndarray, probability: float, confidence: float = 0.90) 
     return ranked_quantile(ordered.size, lambda rank: float(ordered[rank - 1]), probability, confidence)
 
 
-def ranked_quantile(n: int, at: Callable[[int], float], probability: float, confidence: float = 0.90) -> Quantile:
+def ranked_quantile(n: int, at: Callable[[int], float], probability: float, confidence: float) -> Quantile:
     """As `quantile`, from single order statistics: `at` returns the value of a rank of `ranks_read`."""
     place = estimate_place(n, probability)
     below, above = at(floor(place)), at(ceil(place))

@@ -12,6 +12,7 @@ from mc_engine.sampling.designs import (
     RANDOM,
     block_problem,
     block_size,
+    extension_problem,
     grid_levels,
     level_count,
     one_at_a_time_levels,
@@ -115,6 +116,23 @@ def test_a_number_of_cases_that_cuts_a_block_is_told_the_nearest_that_do_not():
     assert block_problem("saltelli", 4, 60) == block_problem("mc", 4, 61) == ""
     assert block_problem("saltelli", 4, 61).endswith("has blocks of 6 cases: 60 or 66 would fit")
     assert block_problem("morris", 4, 3).endswith("has blocks of 5 cases: 5 would fit")
+
+
+@pytest.mark.parametrize(
+    ("manifest", "cases", "message"),
+    [
+        ({}, 1001, ""),
+        ({}, 1000, "has 1000 cases"),
+        ({}, 999, "has 1000 cases"),
+        ({"campaign": {"design": "lhs"}}, 2000, 'the design "lhs" cannot be extended; mc, sobol, saltelli, morris can'),
+        ({"shard": {"number": 1, "of": 2}}, 2000, "is a shard"),
+        ({"upstream": {}}, 2000, "takes its inputs from another run"),
+    ],
+)
+def test_a_run_is_extended_to_more_cases_by_designs_whose_first_cases_stay(manifest, cases, message):
+    problem = extension_problem({"campaign": {"design": "mc"}, **manifest}, 1000, cases)
+    assert problem.startswith(message)
+    assert bool(problem) == bool(message)
 
 
 @pytest.mark.parametrize("design", [*RANDOM, *IN_BLOCKS])

@@ -59,4 +59,5 @@ def test_a_fit_finds_the_components_and_as_many_as_there_are():
     np.testing.assert_allclose(fitted.mean[order], TWO.mean, atol=0.05)
     np.testing.assert_allclose(fitted.kappa[order], TWO.kappa, rtol=0.2)
     np.testing.assert_allclose(fitted.nu[order], TWO.nu, rtol=0.05)
-    assert fitted.kappa[2] == 0.0
+    assert (fitted.kappa[2], fitted.share[2]) == (0.0, pytest.approx(0.1))
+    assert fitted.nu[2] == pytest.approx(0.6 * 15.0 + 0.4 * 9.0, rel=0.05)  # as far out as all cases together

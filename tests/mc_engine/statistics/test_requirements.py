@@ -5,6 +5,7 @@ import pytest
 from scipy.stats import binom
 
 from mc_engine.statistics import judge, judge_all, pass_probability, was_looked_at
+from mc_engine.statistics.requirements import LimitCounts
 
 FUEL = {"name": "fuel", "metric": "propellant_kg", "at_most": 1.0, "at_least": None, "share": 0.9973, "confidence": 0.9}
 
@@ -153,12 +154,42 @@ def test_the_joint_verdict_counts_cases_inside_every_limit_at_once():
     assert (joint.passed, joint.tried, joint.no_number) == (1, 5, 1)
 
 
+def test_counts_of_limits_add_up_over_the_parts_of_a_table():
+    table = {"propellant_kg": np.array([0.5, 1.5, 0.5, 1.5, np.nan]), "speed_m_s": np.array([6.0, 6.0, 4.0, 4.0, 6.0])}
+    counts = LimitCounts([FUEL, SPEED])
+    for part in (slice(0, 2), slice(2, 5)):
+        counts.add(lambda name, part=part: table[name][part], np.ones(5, dtype=bool)[part])
+    assert (counts.outside(0), counts.outside(1), counts.outside()) == (3, 2, 4)
+    assert (counts.without_number(0), counts.without_number(1), counts.without_number()) == (1, 0, 1)
+
+
+def test_a_joint_verdict_names_the_requirement_that_fails_it_alone():
+    fuel = np.full(2000, 0.5)
+    fuel[:100] = 1.5
+    table = {"propellant_kg": fuel, "speed_m_s": np.full(2000, 6.0)}
+    joint = judge_all([FUEL, {**SPEED, "share": 0.5}], table.__getitem__, np.ones(2000, dtype=bool))[1]
+    assert (joint.outcome, joint.failing) == ("fail", ("fuel",))
+    assert joint.failing_words == "fuel fails with confidence shared"
+    passing = both(np.full(5000, 0.5), np.full(5000, 6.0))[1]
+    assert (passing.outcome, passing.failing, passing.failing_words) == ("pass", (), "")
+
+
 def test_the_joint_share_is_one_less_what_each_may_miss_and_its_confidence_the_smallest():
     joint = both([0.5] * 1200, [6.0] * 1200)[1]
     assert joint.share == pytest.approx(1.0 - 0.0027 - 0.0027)
     assert joint.confidence == 0.9
     assert joint.outcome == "pass"
     assert joint.lower == pytest.approx(0.1 ** (1.0 / 1200.0))
+
+
+@pytest.mark.parametrize(("shares", "together"), [((0.9, 0.8), 0.7), ((0.5, 0.5), None), ((0.4, 0.5), None)])
+def test_requirements_that_leave_nothing_to_ask_for_together_have_no_joint_verdict(shares, together):
+    asked = [{**FUEL, "share": shares[0]}, {**SPEED, "share": shares[1]}]
+    table = {"propellant_kg": np.full(50, 0.5), "speed_m_s": np.full(50, 6.0)}
+    verdicts, joint = judge_all(asked, table.__getitem__, np.ones(50, dtype=bool))
+    assert (joint and joint.share) == (together and pytest.approx(together))
+    alone = judge(asked[0], table["propellant_kg"], np.ones(50, dtype=bool))
+    assert (verdicts[0].outcome, verdicts[0].lower) == (alone.outcome, alone.lower)
 
 
 def test_requirements_that_pass_alone_can_fail_together():

@@ -26,6 +26,7 @@ def lower_limit(values, accepted, no_number):
 def test_smallest_and_largest_value_enclose_the_share_from_wilks_sample_size_on(share, cases):
     assert smallest_interval_sample(share, 0.95) == cases
     assert smallest_interval_sample(0.95, 0.95, 2) == smallest_sample(0.95, 0.95, 3) == 153
+    assert smallest_sample(0.95, 0.95) == 59  # one-sided, without a failure
 
 
 @pytest.mark.parametrize(("accepted", "limit"), [(0, 5.0), (1, 4.0), (4, 1.0), (5, None), (None, None)])

@@ -100,7 +100,17 @@ def test_a_share_that_was_given_has_all_its_digits(share, text):
     assert percentile(share).startswith(f"{text}")
 
 
+@pytest.mark.parametrize(
+    ("probability", "name"),
+    [(0.01, "1st"), (0.02, "2nd"), (0.5, "50th"), (0.11, "11th"), (0.21, "21st"), (0.13, "13th"), (0.9973, "99.73rd"),
+     (0.975, "97.5th"), (0.99865, "99.865th")],
+)  # fmt: skip
+def test_a_percentile_has_the_ending_of_its_last_digits(probability, name):
+    assert percentile(probability) == f"{name} percentile"
+
+
 def test_a_count_is_grouped_in_threes():
+    assert [fixed(value, 1) for value in (9999.0, 10000.0, -12345.67)] == ["9999.0", "10\u202f000.0", "−12\u202f345.7"]
     assert count(1234567) == "1\u202f234\u202f567"
 
 
@@ -117,6 +127,8 @@ def test_an_interval_says_when_the_cases_are_too_few():
         (1e-8, "1·10⁻⁸"),
         (-1e9, "−1·10⁹"),
         (12345678.5, "1.23456785·10⁷"),
+        (10000000.0, "1·10⁷"),
+        (9999999.0, "9999999"),
         (True, "yes"),
         ("off", "off"),
     ],
