@@ -24,7 +24,7 @@ _SEED = 1  # of the bootstrap behind the intervals: the same cases give the same
 
 @dataclass(frozen=True)
 class DesignedIndices:
-    """Indices by name, float64[n_inputs, n_metrics], NaN where a metric has none; `reach` their half 95 % intervals.
+    """Indices by name, float64[n_inputs, n_metrics], NaN where a metric has none; `reach` their half intervals.
 
     Saltelli: "first_order" and "total", shares of the metric's variance.  Morris: "mu_star", "mu" and "sigma", mean
     size, mean and standard deviation of the metric's change, per step of half the levels, divided by that step as a

@@ -4,8 +4,10 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from synthetic_run import synthetic_run
 
 import mc_engine
@@ -16,7 +18,8 @@ from reports.contributors.companion import companion_blocks, sigma_contribution
 from reports.document.blocks import Table, blocks_of
 from reports.formats.json_data import render_json
 from reports.formats.markdown import render_markdown
-from reports.run.contributions import Contributions, Contributor
+from reports.run.chosen_units import spread_text
+from reports.run.contributions import Contributions, Contributor, _ranked
 from reports.run.flown import Flown
 
 MODEL = Path(__file__).parents[2] / "mc_engine" / "runner" / "contributions" / "model.py"
@@ -88,12 +91,45 @@ def test_a_first_order_effect_without_a_total_effect_is_chance():
     table = next(block for block in companion_blocks(flown, found) if isinstance(block, Table))
     assert [row[1].text for row in table.rows] == ["ve"]
     assert sigma_contribution(sure, 2.0) == 2.0
+    assert sigma_contribution(replace(sure, first=0.25), 2.0) == 1.0  # the root of the share of the variance
     assert sigma_contribution(chance, 2.0) is None
     assert "a first-order effect larger than its total effect" in table.note
     rows["propellant_kg"] = (replace(sure, total=1.0), replace(sure, input="oe_pct", first=0.2, total=0.2))
     table = next(block for block in companion_blocks(flown, found) if isinstance(block, Table))
     assert "larger than its total effect" not in table.note
     assert table.rows[0][0].small.endswith("above σ by chance in the estimates")
+
+
+def test_the_root_sum_square_of_the_contributions_and_the_rest_make_up_sigma():
+    rows = [Contributor("propellant_kg", name, first, first, (first - 0.01, 1.0), (first - 0.01, 1.0))
+            for name, first in (("ve_pct", 0.2), ("oe_pct", 0.16))]  # fmt: skip
+    flown = Flown(synthetic_run(300), "run")
+    effects = {metric: () for metric in flown.key_metrics} | {"propellant_kg": tuple(rows)}
+    found = Contributions(effects, 768, dict.fromkeys(effects, 128), 128, {})
+    table = next(block for block in companion_blocks(flown, found) if isinstance(block, Table))
+    sigma = flown.summaries["propellant_kg"].sd
+    told = [spread_text(flown, "propellant_kg", part * sigma) for part in (1.0, 0.6, 0.8)]
+    assert table.rows[0][0].small == "σ {}; root sum square {}, rest {}".format(*told)
+    place = [column.title for column in table.columns].index("1σ contribution")
+    assert [row[place].value for row in table.rows] == pytest.approx([0.2**0.5 * sigma, 0.4 * sigma], rel=1e-12)
+
+
+def test_effects_are_ranked_by_the_total_one_with_intervals_of_the_stated_confidence_inside_zero_to_one():
+    first = np.array([0.05, 0.9, np.nan, -0.03, 0.02]), np.array([0.02, 0.02, np.nan, 0.01, 0.05])
+    total = np.array([0.25, 0.6, np.nan, 0.04, 0.99]), np.array([0.02, 0.1, np.nan, 0.01, 0.02])
+    flown = SimpleNamespace(stated=SimpleNamespace(confidence=0.9))
+    rows = _ranked(flown, "y", ("a", "b", "gone", "c", "d"), first, total, unassigned=0.05)
+    assert [row.input for row in rows] == ["d", "b", "a", "c"]
+    assert [row.size for row in rows] == pytest.approx([0.99, 0.6 + 1.644854 * 0.1 + 0.05, 0.25, 0.04])
+    d, b, a, c = rows
+    assert a.first_interval == pytest.approx((0.05 - 1.644854 * 0.02, 0.05 + 1.644854 * 0.02))
+    assert a.total_interval == pytest.approx((0.25 - 1.644854 * 0.02, 0.25 + 1.644854 * 0.02 + 0.05))
+    assert (c.first, c.first_interval) == (0.0, pytest.approx((0.0, 1.644854 * 0.01)))
+    assert d.first_interval == pytest.approx((0.0, 0.02 + 1.644854 * 0.05))
+    assert d.total_interval == pytest.approx((0.99 - 1.644854 * 0.02, 1.0))
+    assert b.bounded_first == b.total_interval[1] < b.first
+    assert (b.fall, b.fall_interval) == (None, None)
+    assert [row.surely_acts for row in rows] == [True] * 4
 
 
 def test_an_input_that_names_a_draw_is_said_so_in_the_manifest_and_has_no_share_without_flights(tmp_path):
