@@ -24,6 +24,11 @@ def test_the_running_mean_is_that_of_the_first_cases_with_students_interval():
         low, high = stats.t.interval(0.90, part.size - 1, part.mean(), stats.sem(part))
         assert found.estimate[place] == pytest.approx(part.mean(), abs=1e-8)
         assert (found.lower[place], found.upper[place]) == pytest.approx((low, high), abs=1e-8)
+    assert found.reach == pytest.approx(0.5 * (high - low) / part.std(ddof=1), rel=1e-6)
+    first, second = part[:1499], part[1499:]
+    apart = (first.mean() - second.mean()) / np.hypot(stats.sem(first), stats.sem(second))
+    assert found.halves_p == pytest.approx(2.0 * stats.norm.sf(abs(apart)), rel=1e-6)
+    assert found.tails == pytest.approx(np.mean(np.abs(stats.zscore(part)) ** 3) / np.sqrt(2998), rel=1e-6)
 
 
 def test_the_running_quantile_is_that_of_the_first_cases_with_wilks_interval():
