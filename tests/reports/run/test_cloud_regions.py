@@ -35,6 +35,21 @@ def test_the_words_say_how_many_cases_the_drawn_curves_hold(scale):
         assert abs(held / 4000 - content) < 0.03
 
 
+@pytest.mark.parametrize(("metric", "ends", "kinds"), [
+    ("propellant_kg", [-9.0, 9.0], ["ellipse", "ellipse", "region"]), ("propellant_kg", [-1.0, None], ["region"]),
+    ("entry_speed_m_s", [None, 1.0], ["region"]),
+])  # fmt: skip
+def test_no_ellipse_is_drawn_that_reaches_what_the_model_says_is_impossible(metric, ends, kinds):
+    run = synthetic_run(50)
+    run.manifest["ranges"] = {metric: ends}
+    regions = cloud_regions(Flown(run, "run"), NAMES, *cloud())
+    assert [one.name for one in regions] == kinds
+    low, high = (np.inf if end is None else abs(end) for end in ends)
+    along = regions[-1].x if metric == NAMES[0] else regions[-1].y
+    assert along.min() >= -low
+    assert along.max() <= high
+
+
 def test_there_are_none_where_they_would_mean_nothing():
     x, y = cloud()
     run = Flown(synthetic_run(50), "run")

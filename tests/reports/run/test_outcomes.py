@@ -1,0 +1,45 @@
+"""Outcomes of cases: each is inside all limits, outside one of them, or failed, and counted once."""
+
+import numpy as np
+import pytest
+from synthetic_run import synthetic_run
+
+from reports.run.flown import Flown
+from reports.run.outcomes import COMPLETED, case_outcomes, failures, inside, inside_words, outcome_sentence
+
+
+def flown(failed, outside):
+    """300 cases, the last ones failed, the largest of the others outside the limit of the propellant."""
+    run = synthetic_run(300, failed, requirements=[])
+    limits = [float(np.sort(run.table["propellant_kg"].dropna())[-1 - outside]), 1e9]
+    run.manifest["requirements"] = [
+        {"name": name, "metric": metric, "at_most": limit, "share": 0.9, "confidence": 0.9}
+        for name, metric, limit in zip(("fuel", "speed"), ("propellant_kg", "entry_speed_m_s"), limits, strict=True)
+    ]
+    return Flown(run, "run")
+
+
+@pytest.mark.parametrize(
+    ("failed", "outside", "sentence"),
+    [
+        (3, 5, "292 inside all limits, 5 outside a limit, 3 failed, of 300 cases"),
+        (0, 5, "295 inside all limits, 5 outside a limit, of 300 cases"),
+        (3, 0, "297 inside all limits, 3 failed, of 300 cases"),
+        (300, 0, "0 inside all limits, 300 failed, of 300 cases"),
+    ],
+)
+def test_every_case_is_counted_once(failed, outside, sentence):
+    run = flown(failed, outside) if failed < 300 else Flown(synthetic_run(300, 300), "run")
+    assert outcome_sentence(run) == sentence
+    counts = [300 - failed - outside, outside, failed]
+    assert np.bincount(case_outcomes(run), minlength=3).tolist() == counts
+
+
+def test_cases_are_named_by_the_requirements_that_they_are_inside_of():
+    run = flown(3, 5)
+    fuel, speed = run.verdicts
+    assert [inside(run, [one]).sum() for one in (fuel, speed)] == [292, 297]
+    assert {name: int(lost.sum()) for name, lost in failures(run).items()} == {"fuel": 8, "speed": 3, COMPLETED: 3}
+    assert (inside_words(run), inside_words(run, [speed])) == ("inside all limits", "inside the limit of speed")
+    bare = Flown(synthetic_run(300, 3, requirements=[]), "run")
+    assert outcome_sentence(bare) == "297 completed, 3 failed, of 300 cases"
