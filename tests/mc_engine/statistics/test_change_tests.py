@@ -1,12 +1,14 @@
 """Changes between two runs: planted ones are found, chance is held at its rate, sizes and intervals are right."""
 
+from dataclasses import astuple
+
 import numpy as np
 import pytest
 from scipy.stats import binomtest, fisher_exact, levene, multinomial, norm, rankdata, ttest_rel, wilcoxon
 
 from mc_engine.sampling.streams import uniforms
 from mc_engine.statistics import change_tests
-from mc_engine.statistics.change_tests import holm, metric_change, share_change
+from mc_engine.statistics.change_tests import Estimate, holm, metric_change, share_change
 from mc_engine.studies.comparison import ALPHA
 from mc_engine.studies.comparison_lines import _with_interval
 
@@ -53,6 +55,7 @@ def test_p_values_are_those_of_scipy_and_the_ends_of_intervals_those_that_the_te
     found = metric_change("y", a, b, paired=paired, confidence=0.9)
     assert found.mean == pytest.approx((a.mean(), b.mean()), rel=1e-12)
     assert found.deviation == pytest.approx((a.std(ddof=1), b.std(ddof=1)), rel=1e-12)
+    assert astuple(found.shift_in_sigma) == pytest.approx(np.array(astuple(found.shift)) / a.std(ddof=1), rel=1e-12)
 
     def shift_p(shift):
         if paired:
@@ -100,6 +103,9 @@ def test_the_same_numbers_are_no_change_and_rounding_is_none():
     for b in (a, a + 1e-12, a * (1.0 + 1e-9)):
         found = metric_change("y", a, b, paired=True)
         assert (found.differing, found.shift_p, found.spread_p, found.same) == (0, 1.0, 1.0, True)
+        assert astuple(found.shift) == (0.0, 0.0, 0.0)
+    assert not metric_change("y", a, np.full(a.size, np.nan), paired=True).same
+    assert not metric_change("y", a, np.full(5, np.nan), paired=False).same
     assert metric_change("y", a, a + 1e-3, paired=True).shift_p < 1e-6
 
 
@@ -167,6 +173,15 @@ def test_newcombes_interval_is_the_printed_one():
     a, b = np.arange(80) < 48, np.arange(70) < 56
     found = share_change("inside", a, b, paired=False).difference
     assert (found.lower, found.upper) == pytest.approx((0.0524, 0.3339), abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("estimate", "decimals"),
+    [((5.0, 0.0, 20.0), 0), ((1.25, 1.19, 1.31), 2), ((1.25, 1.244, 1.256), 3), ((0.05, -np.inf, np.inf), 4),
+     ((0.0, 0.0, 0.0), 0), ((1.0, 1.0 - 1e-12, 1.0 + 1e-12), 9)],
+)  # fmt: skip
+def test_an_estimate_has_the_decimals_of_the_width_of_its_interval(estimate, decimals):
+    assert Estimate(*estimate).decimals == decimals
 
 
 def test_holm_multiplies_the_smallest_by_all_and_never_falls():

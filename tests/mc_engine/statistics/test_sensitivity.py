@@ -7,7 +7,7 @@ from scipy.stats import rankdata, spearmanr
 from mc_engine.sampling.streams import uniforms
 from mc_engine.statistics.first_order import contributors, first_order
 from mc_engine.statistics.input_columns import input_columns
-from mc_engine.statistics.sensitivity import sensitivity
+from mc_engine.statistics.sensitivity import beyond_chance, sensitivity
 
 N = 2**13
 
@@ -45,6 +45,11 @@ def test_trends_are_those_of_scipy_least_squares_and_the_inverse_correlation_of_
     assert found.spearman[:, 0] == pytest.approx([spearmanr(column, y).statistic for column in x.T], rel=1e-9)
     assert found.prcc[:, 0] == pytest.approx(-precision[:3, 3] / np.sqrt(precision.diagonal()[:3] * precision[3, 3]))
     assert found.prcc[:, 1] == pytest.approx(found.prcc[:, 0], rel=1e-12)
+
+
+def test_inputs_are_correlated_beyond_five_standard_errors_and_a_twentieth():
+    found = [beyond_chance(*pair) for pair in ((0.49, 100), (-0.51, 100), (0.04, 40_000), (0.06, 40_000))]
+    assert found == [False, True, False, True]
 
 
 def test_an_input_or_a_metric_that_does_not_vary_has_no_index_and_changes_none():
