@@ -78,10 +78,12 @@ def _fly_missing(store: Store, campaign: Campaign, session: Session, repair: boo
     missing = sum(task.stop - task.first for task in tasks)
     store.note("started", backend=session.backend.name, workers=session.workers, chunk=size, missing=missing)
     begin = time.perf_counter()
-    nominal = not _has_sound_nominal(store)
+    nominal = store.nominal_part is None or bool(_nominal_problem(store))
     begun = _run_tasks(store, campaign, session, nominal, tasks, lambda _, part: store.publish(part), stop.is_set)
-    if store.missing() or not _has_sound_nominal(store):
+    if store.missing() or store.nominal_part is None:
         raise _interrupted(store)
+    if problem := _nominal_problem(store):
+        raise _interrupted(store, f"; {problem}")
     remove_logs(store.path)
     flown = time.perf_counter()
     _fly_histories(store, campaign, session, stop.is_set)
@@ -125,7 +127,8 @@ def fly_failed(store: Store, campaign: Campaign, session: Session) -> Store:
         tasks = rerun_tasks(store.path, store.parts)
         cases = sum(len(task.failed) for task in tasks)
         store.note("rerun", backend=session.backend.name, workers=session.workers, cases=cases)
-        nominal = not _has_sound_nominal(store) or store.nominal()["status"] != STATUS_NAME[OK]
+        lost = store.nominal_part is None or bool(_nominal_problem(store))
+        nominal = lost or store.nominal()["status"] != STATUS_NAME[OK]
         remaining = {task.first for task in tasks} | ({NOMINAL_CASE} if nominal else set())
 
         def commit(task: Task, written: Written) -> None:
@@ -235,9 +238,13 @@ def _fly_companion(store: Store, campaign: Campaign, session: Session, repair: b
         _fly_missing(inner, beside, replace(session, progress=report, chunk=None), repair, stop)
 
 
-def _has_sound_nominal(store: Store) -> bool:
-    part = store.nominal_part
-    return part is not None and not problem_of(store.path / part.file, store.nominal)
+def _nominal_problem(store: Store) -> str:
+    """Why the nominal case cannot be read; empty if it can, or has not been flown."""
+    if store.nominal_part is None:
+        return ""
+    path = store.path / store.nominal_part.file
+    problem = problem_of(path, store.nominal)
+    return problem and f"{path}: {problem}"
 
 
 def _missing_tasks(store: Store, session: Session, flyer: Flyer) -> tuple[list[Task], int]:

@@ -45,7 +45,7 @@ _SEARCH: Shape = {
 _SIGMAS: Shape = dict.fromkeys(("mean_sigma", "spread_sigma", "likeliest_sigma", "likeliest"), float)
 _ESTIMATE: Shape = {
     "asked": {"method": str, "cases_per_level": Some},
-    "requirement": {**_NAMED, **_LIMITS, "share": Share},
+    "requirement": {**_NAMED, **_LIMITS, "share": Share, "confidence": Share},
     "metric": _NAMED,
     "method": Literal["subset", "cross-entropy", "plain"],
     **dict.fromkeys(("probability", "lower", "upper"), Annotated[float, Field(ge=0.0, le=10.0)]),  # of an estimate

@@ -80,17 +80,18 @@ def points(seed, n):
 
 
 def assert_is_an_optimum(burns, inclination, thrust):
-    """The propellant [kg] of the optimum, which keeps every condition of one and is above its bound of impulses."""
+    """The propellant [kg] of the optimum, which keeps every condition of one and is above its bound of impulses.
+
+    Two burns of a weak thrust are only the best of their kind: within a long burn thrust need not pay.
+    """
     best = solution(burns, inclination, thrust)
     assert elements(best.states[-1]) == pytest.approx((42_164.137, 0.0, 0.0), abs=1e-6)
     flown = arcs(best, 60)
     assert is_optimal(best) == all(((arc.switching if arc.burning else -arc.switching) < 1e-9).all() for arc in flown)
     for arc in flown:
         assert np.abs(arc.hamiltonian).max() < 1e-9
-        if arc.burning:
-            assert (arc.switching < 1e-9).all()
-        elif burns == 3 or thrust > STRONG:
-            assert (arc.switching > -1e-9).all()
+        if burns == 3 or thrust > STRONG:
+            assert ((arc.switching if arc.burning else -arc.switching) < 1e-9).all()
     assert used_kg(best) > impulses_kg(best.problem)
     return used_kg(best)
 
