@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from mc_engine.flight.kernel import finer, source_digest, usual_width
 from mc_engine.flight.lost_numbers import first_lost, may_be_lost
 from mc_engine.model.fields import AdaptiveStep
 from mc_engine.model.record import compiled_model
-from mc_engine.status import OK, STATUS_NAME
 from mc_engine.store.case_rows import RowLog
 
 
@@ -68,19 +66,10 @@ class CompiledFlyer(Flyer):
     def refuse_faults(self) -> None:
         refuse_breaches(self._campaign)
 
-    def integration_changes(self, inputs: Inputs, noise: np.ndarray) -> dict[str, Any] | None:
-        clock, metrics = self._model.clock, [metric.name for metric in self._model.metrics]
-        fly = partial(flight.fly, self._model, inputs, noise, self._seed, folder=self._folder)
-        own, fine = fly(), fly(clock=finer(clock))
-        used = (own["status"] == STATUS_NAME[OK]) & (fine["status"] == STATUS_NAME[OK])
-        changes = {name: abs(fine[name] - own[name])[used] for name in metrics}
-        known = {name: change[np.isfinite(change)] for name, change in changes.items()}  # a metric may be missing
-        return {
-            "by": "a tenth of the tolerances" if isinstance(clock, AdaptiveStep) else "half of the step",
-            "tried": len(noise),
-            "used": int(used.sum()),
-            "changes": {name: float(change.max()) for name, change in known.items() if change.size},
-        }
+    def fly_finer(self, inputs: Inputs, noise: np.ndarray) -> tuple[str, Columns] | None:
+        clock = self._model.clock
+        by = "a tenth of the tolerances" if isinstance(clock, AdaptiveStep) else "half of the step"
+        return by, flight.fly(self._model, inputs, noise, self._seed, folder=self._folder, clock=finer(clock))
 
     def lost_number(self, inputs: Inputs, noise: int, results: Columns, who: str) -> str:
         if not may_be_lost(self._model, results):

@@ -115,12 +115,8 @@ class Flyer(ABC):
             return not np.array_equal(stored, value, equal_nan=True)
         return bool(abs(stored - value) > self.tolerance * max(abs(stored), abs(value)))
 
-    def integration_changes(self, inputs: Inputs, noise: np.ndarray) -> dict[str, Any] | None:
-        """How finer steps change the metrics of some cases; None for what has no steps to be chosen.
-
-        by : in words.  tried : cases, used : those completed both ways.  changes : by metric the largest change, in its
-        unit; a metric that is missing in all of them is left out.
-        """
+    def fly_finer(self, inputs: Inputs, noise: np.ndarray) -> tuple[str, Columns] | None:
+        """(what is finer, results of the cases) of a finer integration; None for what has no steps to be chosen."""
         return None
 
     def lost_number(self, inputs: Inputs, noise: int, results: Columns, who: str) -> str:

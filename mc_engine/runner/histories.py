@@ -14,8 +14,8 @@ from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import in_threads
 from mc_engine.runner.summary import metric_parts
 from mc_engine.statistics.worst import WorstSoFar, limits_on
-from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, REFUSED, STATUS_NAME, TIME_LIMIT, WORKER_DIED
-from mc_engine.store.parts import problem_of
+from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, OK, REFUSED, STATUS_NAME, TIME_LIMIT, WORKER_DIED
+from mc_engine.store.parts import numbers_in, problem_of, read_part
 from mc_engine.store.run_files import NOMINAL_CASE
 from mc_engine.store.store import Store
 
@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _DANGEROUS = tuple(STATUS_NAME[code] for code in (WORKER_DIED, TIME_LIMIT, CRASHED, MEMORY_LIMIT, NO_RESULT))
-
-_MOST_FINER, _FINER_OF = 16, 100  # cases that fly with finer steps: one of so many, so that their time does not count
+_MOST_FINER, _FINER_OF = 16, 100  # cases that fly with finer steps, one of so many: it takes little time
 
 
 def inputs_of(campaign: Campaign, case_id: int | None) -> tuple[dict[str, Any], int]:
@@ -63,15 +62,31 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
 
 
 def integration_changes(store: Store, campaign: Campaign) -> dict[str, Any] | None:
-    """How finer steps change the metrics of the first cases of a run, see `Flyer`; None of a shard or a companion."""
-    dangerous = _cases_that_ended(store, _DANGEROUS)
-    cases = [case for case in range(min(_MOST_FINER, -(-store.n_cases // _FINER_OF))) if case not in dangerous]
-    if len(store.wanted) < store.n_cases or "sensitivity" in store.manifest or not cases:
+    """How a finer integration changes the metrics of a run's first cases; None of a shard, companion or simulator.
+
+    by : what is finer, in words.  tried : cases, used : those that complete both ways.  changes : by metric the largest
+    change, in its unit; a metric that no case has both ways is left out.
+    """
+    if len(store.wanted) < store.n_cases or "sensitivity" in store.manifest:
         return None
-    table, noise = drawn(campaign, np.array(cases, dtype=np.int64))
+    first, metrics = store.parts[0], [metric.name for metric in campaign.model.metrics]
+    tried = min(_MOST_FINER, -(-store.n_cases // _FINER_OF), first.rows)
+    columns = [column for column in store.columns if column.name in ("status", *metrics)]
+    own = read_part(store.path, first, columns).slice(0, tried)
+    cases = np.flatnonzero([word == STATUS_NAME[OK] for word in own["status"].to_pylist()])
+    if not cases.size:
+        return None
+    table, noise = drawn(campaign, cases)
     inputs = full_inputs(campaign, table)
-    [changes] = in_threads(lambda flyer: flyer.integration_changes(inputs, noise), [flyer_of(campaign)])
-    return changes
+    [flown] = in_threads(lambda flyer: flyer.fly_finer(inputs, noise), [flyer_of(campaign)])
+    if flown is None:
+        return None
+    by, fine = flown
+    changes = {name: abs(fine[name] - numbers_in(own[name])[cases]) for name in metrics}
+    known = {name: change[np.isfinite(change)] for name, change in changes.items()}
+    used = int((fine["status"] == STATUS_NAME[OK]).sum())
+    largest = {name: float(change.max()) for name, change in known.items() if change.size}
+    return {"by": by, "tried": tried, "used": used, "changes": largest}
 
 
 def _histories_of(campaign: Campaign, flyer: Flyer, cases: Sequence[int], stopped: Callable[[], bool]) -> list[Columns]:

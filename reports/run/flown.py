@@ -227,7 +227,7 @@ class Flown:
 
     @cached_property
     def integration(self) -> Mapping[str, Any]:
-        """How finer steps change the metrics, in their own units, see `Flyer.integration_changes`; empty if unknown."""
+        """How finer steps change the metrics, in their own units, see `runner.histories`; empty if unknown."""
         notes = getattr(self.run, "notes", None)
         found = [entry.facts.get("integration") for entry in (notes("finished") if callable(notes) else ())]
         return next((facts for facts in reversed(found) if facts), {})
