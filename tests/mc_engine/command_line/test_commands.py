@@ -291,7 +291,7 @@ def test_verify_names_each_damaged_file_and_exits_with_5(here):
         path.write_bytes(path.read_bytes()[:-3])
     fails_with(5, call("verify", "flown"), files[0].name, files[1].name, "flown: 2 problems")
     (store.path / "journal.jsonl").write_bytes(b"?\n?\n")
-    fails_with(5, call("verify", "flown"), "flown/journal.jsonl, line 1: damaged")
+    fails_with(5, call("verify", "flown"), "flown/journal.jsonl: its first line, the creation, is lost")
 
 
 def test_summary_tells_the_metrics_asked_for_and_refuses_others(here):
