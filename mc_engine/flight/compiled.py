@@ -66,7 +66,8 @@ class CompiledFlyer(Flyer):
     def refuse_faults(self) -> None:
         refuse_breaches(self._campaign)
 
-    def fly_finer(self, inputs: Inputs, noise: np.ndarray) -> tuple[str, Columns] | None:
+    def fly_finer(self, inputs: Inputs, noise: np.ndarray) -> tuple[str, Columns]:
+        """(what is finer, results of the cases) with half of the steps, or a tenth of the tolerances."""
         clock = self._model.clock
         by = "a tenth of the tolerances" if isinstance(clock, AdaptiveStep) else "half of the step"
         return by, flight.fly(self._model, inputs, noise, self._seed, folder=self._folder, clock=finer(clock))

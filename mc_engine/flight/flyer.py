@@ -115,10 +115,6 @@ class Flyer(ABC):
             return not np.array_equal(stored, value, equal_nan=True)
         return bool(abs(stored - value) > self.tolerance * max(abs(stored), abs(value)))
 
-    def fly_finer(self, inputs: Inputs, noise: np.ndarray) -> tuple[str, Columns] | None:
-        """(what is finer, results of the cases) of a finer integration; None for what has no steps to be chosen."""
-        return None
-
     def lost_number(self, inputs: Inputs, noise: int, results: Columns, who: str) -> str:
         """Where a number of a failed flight became infinite or NaN, as a sentence; empty where that is not known."""
         return ""

@@ -12,6 +12,7 @@ from mc_engine.flight.chunks import drawn
 from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import in_threads
+from mc_engine.model.simulator import Simulator
 from mc_engine.runner.summary import metric_parts
 from mc_engine.statistics.worst import WorstSoFar, limits_on
 from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, OK, REFUSED, STATUS_NAME, TIME_LIMIT, WORKER_DIED
@@ -67,8 +68,10 @@ def integration_changes(store: Store, campaign: Campaign) -> dict[str, Any] | No
     by : what is finer, in words.  tried : cases, used : those that complete both ways.  changes : by metric the largest
     change, in its unit; a metric that no case has both ways is left out.
     """
-    if len(store.wanted) < store.n_cases or "sensitivity" in store.manifest:
+    if len(store.wanted) < store.n_cases or "sensitivity" in store.manifest or isinstance(campaign.model, Simulator):
         return None
+    from mc_engine.flight.compiled import CompiledFlyer
+
     first, metrics = store.parts[0], [metric.name for metric in campaign.model.metrics]
     tried = min(_MOST_FINER, -(-store.n_cases // _FINER_OF), first.rows)
     columns = [column for column in store.columns if column.name in ("status", *metrics)]
@@ -78,10 +81,7 @@ def integration_changes(store: Store, campaign: Campaign) -> dict[str, Any] | No
         return None
     table, noise = drawn(campaign, cases)
     inputs = full_inputs(campaign, table)
-    [flown] = in_threads(lambda flyer: flyer.fly_finer(inputs, noise), [flyer_of(campaign)])
-    if flown is None:
-        return None
-    by, fine = flown
+    [(by, fine)] = in_threads(lambda flyer: flyer.fly_finer(inputs, noise), [CompiledFlyer(campaign)])
     changes = {name: abs(fine[name] - numbers_in(own[name])[cases]) for name in metrics}
     known = {name: change[np.isfinite(change)] for name, change in changes.items()}
     used = int((fine["status"] == STATUS_NAME[OK]).sum())

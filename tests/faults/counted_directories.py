@@ -92,7 +92,7 @@ def a_rare_event(folder):
     estimate = {
         "asked": {"method": "subset", "cases_per_level": 10},
         "requirement": {"name": "fuel", "metric": "cost_kg", "share": 0.99, "at_most": 2.5, "at_least": None,
-                        "source": ""},
+                        "confidence": 0.9, "source": ""},
         "metric": {"name": "cost_kg", "unit": "kg", "description": "cost"},
         "method": "subset", "probability": 1e-3, "lower": 5e-4, "upper": 2e-3, "confidence": 0.95,
         "relative_error": 0.2, "plain_cases": 1e5, "cases": 10, "failed": 3, "no_number": 0,

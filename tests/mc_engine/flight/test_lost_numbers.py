@@ -91,9 +91,9 @@ def test_check_and_replay_name_the_line_of_a_number_that_is_lost_in_flight(tmp_p
     done = mc_engine_says(tmp_path, "run", "rocket", "--cases", "8", "--no-report", "--out", "run")
     case = int(mc_engine.open_store(tmp_path / "run").cases().query("status == 'not-finite'")["case_id"].iloc[0])
     replayed = mc_engine_says(tmp_path, "replay", "run", str(case))
-    assert replayed[2].startswith(sentence)
-    assert f"case {case})" in replayed[2]
-    assert replayed[3] == f"case {case}: every stored number has the same bits"
+    assert replayed[0].startswith(sentence)
+    assert f"case {case})" in replayed[0]
+    assert replayed[1] == f"case {case}: every stored number has the same bits"
     assert done[0].startswith("run ")
 
 
