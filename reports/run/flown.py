@@ -21,6 +21,7 @@ from reports.text.numbers import axis_label, count, named, same_lengths, words
 
 URGENCY = ("fail", "not demonstrable", "pass")  # of verdicts, the first to be looked at first
 NEGLIGIBLE = 1e-7  # of the size of a metric
+ROUNDING = 1e-13  # of numbers of which another one is the difference
 SQUARABLE = 1e140  # largest number, and inverse of the smallest spread, whose squares over all cases can be summed
 NEGLIGIBLE_SPREAD = "standard deviation below a ten-millionth of the value"
 UNSQUARABLE = "numbers beyond 1e140 or a standard deviation below 1e-140"
@@ -233,9 +234,18 @@ class Flown:
         return next((facts for facts in reversed(found) if facts), {})
 
     def integration_share(self, metric: str) -> float | None:
-        """The change of a metric by finer steps over its standard deviation; None where one of them is not known."""
-        change, summary = self.integration.get("changes", {}).get(metric), self.own.summaries.get(metric)
-        return change / summary.spread if change is not None and summary is not None and summary.spread else None
+        """The change of a metric by finer steps over its standard deviation.
+
+        None where one of them is not known, or is but the rounding of larger metrics in its unit: the crossrange of a
+        planar flight beside its range.
+        """
+        own, summaries = self.own, self.own.summaries
+        change, summary = self.integration.get("changes", {}).get(metric), summaries.get(metric)
+        if change is None or summary is None or not summary.spread:
+            return None
+        alike = [other for name, other in summaries.items() if own.unit(name) == own.unit(metric)]
+        largest = max(abs(end) for other in alike for end in (other.minimum, other.maximum) if end is not None)
+        return change / summary.spread if summary.spread > ROUNDING * largest else None
 
     @cached_property
     def key_metrics(self) -> list[str]:

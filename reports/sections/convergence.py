@@ -145,7 +145,7 @@ def integration_table(flown: Flown) -> Table | None:
     note = (
         f"The first cases of the run, flown again with {facts['by']}; {cases} completed both ways. The change is an "
         f"estimate of the error of integration. {others}Negligible: at most {number(LITTLE)} standard deviations σ of "
-        f"the metric; small: at most {number(MUCH)}. A metric that does not vary is not told."
+        f"the metric; small: at most {number(MUCH)}. A metric that does not vary, or by rounding only, is not told."
     )
     return Table(f"Change of the metrics with {facts['by']}", columns, rows, note)
 

@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from synthetic_run import synthetic_run
 
@@ -65,3 +66,13 @@ def test_the_error_of_integration_is_told_in_standard_deviations_and_a_large_one
     [warning] = [sentence for sentence in warnings(flown) if "half of the step" in sentence]
     assert "propellant would change by more than 0.1 standard deviations" in warning
     assert integration_table(Flown(synthetic_run(100), "run")) is None
+
+
+def test_a_metric_that_is_rounding_beside_others_in_its_unit_has_no_error_of_integration():
+    run, changes = synthetic_run(200), {"correction_impulse_m_s": 1e-10, "entry_speed_m_s": 1e-3}
+    run.notes = lambda event=None: [SimpleNamespace(event="finished", facts={"integration": {"changes": changes}})]
+    assert Flown(run, "run").integration_share("correction_impulse_m_s") > 0.0
+    run.table["correction_impulse_m_s"] = np.resize([1e-10, -1e-10], len(run.table))  # of 7800 m/s
+    flown = Flown(run, "run")
+    assert flown.integration_share("correction_impulse_m_s") is None
+    assert flown.integration_share("entry_speed_m_s") > 0.0
