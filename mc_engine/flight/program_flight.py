@@ -317,12 +317,12 @@ def _document(folder: Path, name: str) -> Any:
     except (ValueError, RecursionError, csv.Error) as error:
         raise ValueError(f"{name} cannot be read: {error}") from None
     if len(rows) != 2 or len(rows[0]) != len(rows[1]):
-        fields = " and ".join(str(len(row)) for row in rows[:3]) or "no"
-        found = f"{counted(len(rows), 'row')} of {fields} fields"
+        found = f"{counted(len(rows), 'row')} of {' and '.join(str(len(row)) for row in rows[:3]) or 'no'} fields"
         raise ValueError(f"{name} has {found}; it must have one of names and one of numbers, of equal length")
-    names = [name.strip() for name in rows[0]]
-    same = {name: [value for other, value in zip(names, rows[1], strict=True) if other == name] for name in names}
-    return {name: values[0] if len(values) == 1 else values for name, values in same.items()}
+    same: dict[str, list[str]] = {name.strip(): [] for name in rows[0]}
+    for name, value in zip(*rows, strict=True):
+        same[name.strip()].append(value)
+    return {name: values if len(values) > 1 else values[0] for name, values in same.items()}
 
 
 def _table(folder: Path, name: str) -> tuple[list[str], np.ndarray]:

@@ -65,8 +65,8 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
 def integration_changes(store: Store, campaign: Campaign) -> dict[str, Any] | None:
     """How a finer integration changes the metrics of a run's first cases; None of a shard, companion or simulator.
 
-    by : what is finer, in words.  tried : cases, used : those that complete both ways.  changes : by metric the largest
-    change, in its unit; a metric that no case has both ways is left out.
+    by : what is finer, in words.  tried : cases, used : those that complete both ways, with the same metrics.
+    changes : by metric the largest of these, in its unit; a metric that none of them has is left out.
     """
     if len(store.wanted) < store.n_cases or "sensitivity" in store.manifest or isinstance(campaign.model, Simulator):
         return None
@@ -81,12 +81,14 @@ def integration_changes(store: Store, campaign: Campaign) -> dict[str, Any] | No
         return None
     table, noise = drawn(campaign, cases)
     inputs = full_inputs(campaign, table)
+    numbers = {name: numbers_in(own[name])[cases] for name in metrics}
     [(by, fine)] = in_threads(lambda flyer: flyer.fly_finer(inputs, noise), [CompiledFlyer(campaign)])
-    changes = {name: abs(fine[name] - numbers_in(own[name])[cases]) for name in metrics}
-    known = {name: change[np.isfinite(change)] for name, change in changes.items()}
-    used = int((fine["status"] == STATUS_NAME[OK]).sum())
+    before, after = (np.array([columns[name] for name in metrics]) for columns in (numbers, fine))
+    used = (fine["status"] == STATUS_NAME[OK]) & (np.isnan(before) == np.isnan(after)).all(axis=0)
+    changes = abs(after - before)[:, used]
+    known = {name: change[~np.isnan(change)] for name, change in zip(metrics, changes, strict=True)}
     largest = {name: float(change.max()) for name, change in known.items() if change.size}
-    return {"by": by, "tried": tried, "used": used, "changes": largest}
+    return {"by": by, "tried": tried, "used": int(used.sum()), "changes": largest}
 
 
 def _histories_of(campaign: Campaign, flyer: Flyer, cases: Sequence[int], stopped: Callable[[], bool]) -> list[Columns]:

@@ -78,12 +78,10 @@ def _fly_missing(store: Store, campaign: Campaign, session: Session, repair: boo
     missing = sum(task.stop - task.first for task in tasks)
     store.note("started", backend=session.backend.name, workers=session.workers, chunk=size, missing=missing)
     begin = time.perf_counter()
-    nominal = store.nominal_part is None or bool(_nominal_problem(store))
+    nominal = bool(_nominal_problem(store))
     begun = _run_tasks(store, campaign, session, nominal, tasks, lambda _, part: store.publish(part), stop.is_set)
-    if store.missing() or store.nominal_part is None:
-        raise _interrupted(store)
-    if problem := _nominal_problem(store):
-        raise _interrupted(store, f"; {problem}")
+    if (problem := _nominal_problem(store)) or store.missing():
+        raise _interrupted(store, f"; {problem}" if store.nominal_part and problem else "")
     remove_logs(store.path)
     flown = time.perf_counter()
     _fly_histories(store, campaign, session, stop.is_set)
@@ -127,8 +125,7 @@ def fly_failed(store: Store, campaign: Campaign, session: Session) -> Store:
         tasks = rerun_tasks(store.path, store.parts)
         cases = sum(len(task.failed) for task in tasks)
         store.note("rerun", backend=session.backend.name, workers=session.workers, cases=cases)
-        lost = store.nominal_part is None or bool(_nominal_problem(store))
-        nominal = lost or store.nominal()["status"] != STATUS_NAME[OK]
+        nominal = bool(_nominal_problem(store)) or store.nominal()["status"] != STATUS_NAME[OK]
         remaining = {task.first for task in tasks} | ({NOMINAL_CASE} if nominal else set())
 
         def commit(task: Task, written: Written) -> None:
@@ -239,9 +236,9 @@ def _fly_companion(store: Store, campaign: Campaign, session: Session, repair: b
 
 
 def _nominal_problem(store: Store) -> str:
-    """Why the nominal case cannot be read; empty if it can, or has not been flown."""
+    """Why there is no nominal case that can be read; empty if there is."""
     if store.nominal_part is None:
-        return ""
+        return "the nominal case has not been flown"
     path = store.path / store.nominal_part.file
     problem = problem_of(path, store.nominal)
     return problem and f"{path}: {problem}"

@@ -194,17 +194,19 @@ def render_json(document: Document) -> bytes:
 
 def run_data(flown: Flown) -> dict[str, Any]:
     """The numbers of a run's report, by the fields of ReportRecord."""
-    contributions = flown.contributions
+    contributions, integration = flown.contributions, flown.integration
+    rows = [] if contributions is None else contributions.rows()
+    changes = {} if integration is None else integration.changes
     return {
         "probability": flown.stated.probability,
         "confidence": flown.stated.confidence,
         "counts": _counts_record(flown),
         "requirements": [_requirement_record(flown, verdict) for verdict in flown.verdicts],
         "joint": None if flown.joint is None else _requirement_record(flown, flown.joint),
-        "metrics": [_metric_record(flown, name, summary) for name, summary in flown.summaries.items()],
-        "contributors": []
-        if contributions is None
-        else [ContributorRecord(**asdict(row)) for row in contributions.rows()],
+        "metrics": [
+            _metric_record(flown, name, summary, changes.get(name)) for name, summary in flown.summaries.items()
+        ],
+        "contributors": [ContributorRecord(**asdict(row)) for row in rows],
         "contributor_flights": 0 if contributions is None else contributions.flights,
         "worst": [record for verdict in flown.verdicts for record in _worst_records(flown, verdict)],
     }
@@ -244,7 +246,7 @@ def _bounds(verdict: Verdict) -> Bounds | None:
     return "every number of cases" if verdict.looked else "fixed number of cases"
 
 
-def _metric_record(flown: Flown, name: str, summary: Summary) -> MetricRecord:
+def _metric_record(flown: Flown, name: str, summary: Summary, change: float | None) -> MetricRecord:
     facts = flown.columns[name]
     return MetricRecord(
         name=name,
@@ -257,7 +259,7 @@ def _metric_record(flown: Flown, name: str, summary: Summary) -> MetricRecord:
         sigma=number_or_none(summary.sd),
         minimum=summary.minimum,
         maximum=summary.maximum,
-        integration_change=flown.integration.get("changes", {}).get(name),
+        integration_change=change,
         quantiles=[QuantileRecord(**asdict(quantile)) for quantile in summary.quantiles],
     )
 

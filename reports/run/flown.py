@@ -1,12 +1,14 @@
 """The run as the report sees it: the table, the nominal, what every column is, and which metrics matter."""
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from pydantic import BaseModel, FiniteFloat, ValidationError
 
 from mc_engine.model.figures import KINDS, MapFigure, ScatterFigure, from_record
 from mc_engine.section import ReportSection
@@ -35,6 +37,15 @@ class ColumnFacts:
     unit: str
     role: str
     description: str
+
+
+class Integration(BaseModel):
+    """How finer steps change the metrics, in their own units, see `runner.histories.integration_changes`."""
+
+    by: str
+    tried: int
+    used: int
+    changes: dict[str, FiniteFloat]
 
 
 class Flown:
@@ -227,11 +238,13 @@ class Flown:
         return was_looked_at(self.manifest, self.n_wanted, self.n_tried)
 
     @cached_property
-    def integration(self) -> Mapping[str, Any]:
-        """How finer steps change the metrics, in their own units, see `runner.histories`; empty if unknown."""
+    def integration(self) -> Integration | None:
+        """How finer steps change the metrics, by the journal's last note on it; None where there is none."""
         notes = getattr(self.run, "notes", None)
-        found = [entry.facts.get("integration") for entry in (notes("finished") if callable(notes) else ())]
-        return next((facts for facts in reversed(found) if facts), {})
+        for entry in reversed(notes("finished") if callable(notes) else []):
+            with suppress(TypeError, ValidationError):
+                return Integration(**entry.facts.get("integration"))
+        return None
 
     def integration_share(self, metric: str) -> float | None:
         """The change of a metric by finer steps over its standard deviation.
@@ -240,7 +253,8 @@ class Flown:
         planar flight beside its range.
         """
         own, summaries = self.own, self.own.summaries
-        change, summary = self.integration.get("changes", {}).get(metric), summaries.get(metric)
+        known = {} if self.integration is None else self.integration.changes
+        change, summary = known.get(metric), summaries.get(metric)
         if change is None or summary is None or not summary.spread:
             return None
         alike = [other for name, other in summaries.items() if own.unit(name) == own.unit(metric)]

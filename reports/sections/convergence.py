@@ -132,30 +132,30 @@ def _two_digits_up(cases: int) -> int:
 
 def integration_table(flown: Flown) -> Table | None:
     """How much finer steps change the metrics that matter, against their spread; None where that is not known."""
-    facts, shares = flown.integration, {name: flown.integration_share(name) for name in flown.key_metrics}
-    known = {name: share for name, share in shares.items() if share is not None}
-    if not known:
+    shares = {name: flown.integration_share(name) for name in flown.key_metrics}
+    known, found = {name: share for name, share in shares.items() if share is not None}, flown.integration
+    if found is None or not known:
         return None
     columns = (Column("Metric", "text"), Column("Largest change", "number"), Column("In its σ", "number"),
                Column("Error of integration", "text"))  # fmt: skip
     largest = sorted(known, key=lambda name: -known[name])[:MOST_METRICS]
-    rows = tuple(_integration_row(flown, name, known[name]) for name in largest)
-    cases = f"{count(facts['used'])} of {count(facts['tried'])} cases"
+    rows = tuple(_integration_row(flown, name, found.changes[name], known[name]) for name in largest)
+    cases = f"{count(found.used)} of {count(found.tried)} cases"
     others = f"Of {count(len(known))} metrics, those that change most. " if len(known) > len(rows) else ""
     note = (
-        f"The first cases of the run, flown again with {facts['by']}; {cases} completed both ways. The change is an "
-        f"estimate of the error of integration. {others}Negligible: at most {number(LITTLE)} standard deviations σ of "
-        f"the metric; small: at most {number(MUCH)}. A metric that does not vary, or by rounding only, is not told."
+        f"The first cases of the run, flown again with {found.by}; {cases} completed both ways, with the same metrics. "
+        f"The change is an estimate of the error of integration. {others}Negligible: at most {number(LITTLE)} standard "
+        f"deviations σ of the metric; small: at most {number(MUCH)}. A metric that does not vary, or by rounding only, "
+        "is not told."
     )
-    return Table(f"Change of the metrics with {facts['by']}", columns, rows, note)
+    return Table(f"Change of the metrics with {found.by}", columns, rows, note)
 
 
-def _integration_row(flown: Flown, name: str, share: float) -> tuple[Cell, ...]:
-    change, unit = flown.integration["changes"][name], flown.own.unit(name)
+def _integration_row(flown: Flown, name: str, change: float, share: float) -> tuple[Cell, ...]:
     grade = Cell("negligible", tone="good") if share <= LITTLE else Cell("small", tone="open")
     return (
         Cell(flown.axis(name)),
-        Cell(with_unit(number(change, 2), unit), change),
+        Cell(with_unit(number(change, 2), flown.own.unit(name)), change),
         Cell(f"{number(share, 2)} σ", share),
-        grade if share <= MUCH else Cell("not small", small="take shorter steps", tone="bad"),
+        grade if share <= MUCH else Cell("not small", small="take finer steps", tone="bad"),
     )

@@ -170,9 +170,10 @@ def warnings(flown: Flown) -> tuple[str, ...]:
             "of them, one picked at random from each of equal stretches of the case numbers."
         )
     judged = dict.fromkeys(verdict.metric for verdict in flown.verdicts)
-    if coarse := [name for name in judged if (flown.integration_share(name) or 0.0) > MUCH]:
+    coarse = [name for name in judged if (flown.integration_share(name) or 0.0) > MUCH]
+    if coarse and flown.integration is not None:
         sentences.append(
-            f"With {flown.integration['by']}, {flown.listed(coarse)} would change by more than {number(MUCH)} standard "
+            f"With {flown.integration.by}, {flown.listed(coarse)} would change by more than {number(MUCH)} standard "
             "deviations: the error of integration is not small beside the spread (see Convergence)."
         )
     if not flown.random:

@@ -16,10 +16,11 @@ from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.search import SHIPPED
 from mc_engine.campaign.sections import HistoriesSection
 from mc_engine.errors import CampaignError, EngineError, ModelError, RunInterrupted, StoreError
+from mc_engine.flight.compiled import CompiledFlyer
 from mc_engine.flight.flight import fly
 from mc_engine.model import FixedStep
 from mc_engine.runner import manifest, runner
-from mc_engine.runner.histories import write_histories
+from mc_engine.runner.histories import integration_changes, write_histories
 from mc_engine.runner.shards import Shard
 from mc_engine.store.verification import damage
 
@@ -201,6 +202,21 @@ def test_a_run_ends_with_how_much_half_of_the_step_changes_its_first_cases(flown
     for metric in campaign.model.metrics:
         assert facts["changes"][metric.name] == abs(halved[metric.name] - table[metric.name][:16]).max() > 0.0
     assert not open_store(flown.path / "sensitivity").notes()[-1].facts["integration"]
+
+
+def test_a_case_whose_metric_is_there_with_one_step_alone_is_not_used(flown, monkeypatch):
+    given = CompiledFlyer.fly_finer
+
+    def without(self, inputs, noise):
+        by, columns = given(self, inputs, noise)
+        columns["apogee_time_s"][3] = np.nan
+        columns["top_speed_m_s"][3] = 1e9
+        return by, columns
+
+    monkeypatch.setattr(CompiledFlyer, "fly_finer", without)
+    facts = integration_changes(flown, load_campaign("minimal", cases=2000))
+    assert (facts["used"], facts["tried"]) == (15, 16)
+    assert facts["changes"]["top_speed_m_s"] < 1.0
 
 
 def test_the_worst_cases_keep_their_histories(tmp_path):

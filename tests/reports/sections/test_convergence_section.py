@@ -56,6 +56,7 @@ def test_the_error_of_integration_is_told_in_standard_deviations_and_a_large_one
     run.notes = lambda event=None: [
         SimpleNamespace(event="finished", facts={"integration": facts}),
         SimpleNamespace(event="finished", facts={}),  # of `rerun --failed`
+        SimpleNamespace(event="finished", facts={"integration": {"by": 1, "changes": "?"}}),  # of another program
     ]
     flown = Flown(run, "run")
     table = integration_table(flown)
@@ -70,7 +71,8 @@ def test_the_error_of_integration_is_told_in_standard_deviations_and_a_large_one
 
 def test_a_metric_that_is_rounding_beside_others_in_its_unit_has_no_error_of_integration():
     run, changes = synthetic_run(200), {"correction_impulse_m_s": 1e-10, "entry_speed_m_s": 1e-3}
-    run.notes = lambda event=None: [SimpleNamespace(event="finished", facts={"integration": {"changes": changes}})]
+    facts = {"by": "half of the step", "tried": 2, "used": 2, "changes": changes}
+    run.notes = lambda event=None: [SimpleNamespace(event="finished", facts={"integration": facts})]
     assert Flown(run, "run").integration_share("correction_impulse_m_s") > 0.0
     run.table["correction_impulse_m_s"] = np.resize([1e-10, -1e-10], len(run.table))  # of 7800 m/s
     flown = Flown(run, "run")
