@@ -182,13 +182,13 @@ def write_durably(path: Path, content: bytes) -> None:
     write_inside(path.parent, path.name, content)
 
 
-def write_inside(root: Path, name: str, content: bytes) -> None:
+def write_inside(root: Path, name: str, content: bytes | memoryview) -> None:
     """Replace the file `name` of a directory; on return both the bytes and the name are on the disk."""
     write_synced(root, temporary_name(name), content, name)
     publish(root, temporary_name(name), name)
 
 
-def write_synced(root: Path, name: str, content: bytes, shown: str | None = None) -> None:
+def write_synced(root: Path, name: str, content: bytes | memoryview, shown: str | None = None) -> None:
     """Write a new file and sync its bytes, but not its name.  shown : name for messages, if not `name`."""
     try:
         with _opened(root, name, _NEW, shown) as descriptor:
@@ -271,7 +271,7 @@ def _discard(root: Path, name: str) -> None:
         remove_file(root, name)
 
 
-def write_all(descriptor: int, content: bytes) -> None:
+def write_all(descriptor: int, content: bytes | memoryview) -> None:
     """Write every byte; the system may take fewer at a time."""
     view = memoryview(content)
     while view:

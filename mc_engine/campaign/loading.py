@@ -356,5 +356,5 @@ def _digest(
     for path in [*files, *([table_path] if table_path is not None else [])]:
         digest.update(sha256(path.read_bytes()).digest())
     if upstream is not None:
-        digest.update(upstream.digest.encode())
+        digest.update(upstream.rows.digest.encode())
     return digest.hexdigest()

@@ -56,12 +56,23 @@ class Rows:
 
     @cached_property
     def content(self) -> bytes:
-        """A Parquet file of table and facts: what a run directory keeps, and what the digest is computed from."""
+        """A Parquet file of table and facts: what a run directory keeps."""
         table = arrow_table(self.columns, self.table, self.n_cases, Path(COMPANION))
-        metadata = {**self.facts, "nominal": self.nominal, "columns": [asdict(column) for column in self.columns]}
-        return parquet_bytes(
-            table.replace_schema_metadata({_FACTS: json.dumps(metadata, sort_keys=True, default=float)})
-        )
+        return parquet_bytes(table.replace_schema_metadata({_FACTS: self._all_facts()}))
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of table and facts, whatever the file that they lie in: its bytes change with versions of Arrow."""
+        digest = sha256(self._all_facts().encode())
+        for column in self.columns:
+            values = self.table[column.name]
+            is_word = column.kind == "word"
+            digest.update(json.dumps(values.tolist()).encode() if is_word else np.ascontiguousarray(values).data)
+        return digest.hexdigest()
+
+    def _all_facts(self) -> str:
+        columns = [asdict(column) for column in self.columns]
+        return json.dumps({**self.facts, "nominal": self.nominal, "columns": columns}, sort_keys=True, default=float)
 
 
 @dataclass(frozen=True)
@@ -86,11 +97,6 @@ class Upstream:
     def name(self) -> str:
         """Name of the campaign that was flown."""
         return str(self.rows.facts["name"])
-
-    @property
-    def digest(self) -> str:
-        """SHA-256 of all that is taken."""
-        return sha256(self.rows.content).hexdigest()
 
     def nominal_row(self) -> dict[str, Any]:
         """The upstream columns of the nominal case: the nominal case upstream, and the linked inputs."""

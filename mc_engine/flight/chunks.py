@@ -15,7 +15,7 @@ import numpy as np
 from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.sensitivity_design import noise_ids, upstream_ids
-from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, never
+from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, RunStopped, never
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import in_threads
 from mc_engine.model.faults import naming_faults
@@ -100,8 +100,10 @@ def run_task(
 
     flyer : if another one than the campaign's own.
     guard : entered with the cases of each batch; batches are then no larger than the cases that fly together.
-    Raises RunStopped once `stopped()` is true, if a case may take long.
+    Raises RunStopped if `stopped()` is true before it begins, and while it flies if a case may take long.
     """
+    if stopped():
+        raise RunStopped
     flown, flyer = task.flown(), flyer or flyer_of(campaign)
     batch = None if guard is None else flyer.batch
     log = RowLog(run, task.first, task.stop) if flyer.keeps_rows and task.base is None else None

@@ -15,7 +15,7 @@ from mc_engine.flight.kernel_parts import blocks_of, settings_class
 from mc_engine.lanes.kernel_data import gathered
 from mc_engine.lanes.philox import noise_key
 from mc_engine.model.designs import designing
-from mc_engine.model.fields import AdaptiveStep, FixedStep, Parameter, Setting
+from mc_engine.model.fields import AdaptiveStep, Field, FixedStep, Parameter, Setting
 from mc_engine.model.preparation import Inputs, Prepared, prepare
 from mc_engine.model.record import Model, Refusals
 from mc_engine.model.trial import refuse_unfit
@@ -78,8 +78,13 @@ def _columns(model: Model, refusals: Refusals, out: tuple[np.ndarray, ...]) -> d
             columns["reason"][failed] = [f'in the phase "{word}"' for word in last_phase[failed]]
     metrics = metrics[: len(model.metrics)]
     metrics[:, status != OK] = np.nan
-    columns |= {f"end_{field.name}": row / field.si_factor for field, row in zip(model.states, states, strict=True)}
-    return columns | {field.name: row / field.si_factor for field, row in zip(model.metrics, metrics, strict=True)}
+    columns |= {f"end_{field.name}": _declared(field, row) for field, row in zip(model.states, states, strict=True)}
+    return columns | {field.name: _declared(field, row) for field, row in zip(model.metrics, metrics, strict=True)}
+
+
+def _declared(field: Field, numbers: np.ndarray) -> np.ndarray:
+    """Numbers in SI in the unit of their field."""
+    return numbers if field.si_factor == 1.0 else numbers / field.si_factor
 
 
 def _n_results(model: Model) -> int:

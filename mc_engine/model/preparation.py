@@ -48,10 +48,11 @@ def prepare(model: Model, inputs: Inputs, n_cases: int) -> Prepared:
         if not _all_fit(parameter, given):
             _refuse_unfit(parameter, np.broadcast_to(given, n_cases), refusals)
         column = given * parameter.si_factor
-        setattr(si, parameter.symbol, np.full(n_cases, column) if column.shape != (n_cases,) else column)
-    settings = np.column_stack(
-        [_setting_codes(setting, inputs[setting.name], n_cases) for setting in model.settings] or [np.zeros(n_cases)]
-    )
+        alike = model.prepare is not None and column.shape != (n_cases,)  # the kernel takes one number for all cases
+        setattr(si, parameter.symbol, np.full(n_cases, column) if alike else column)
+    settings = np.zeros((n_cases, max(1, len(model.settings))))
+    for i, setting in enumerate(model.settings):
+        settings[:, i] = _setting_codes(setting, inputs[setting.name])
     columns: Mapping[str, np.ndarray] = vars(si)
     if model.prepare is not None:
         words = SimpleNamespace(**{setting.symbol: settings[:, i] for i, setting in enumerate(model.settings)})
@@ -113,10 +114,9 @@ def _design(model: Model) -> str:
     return f"{place_of(model.prepare)}: `prepare`" if model.prepare else "the model"
 
 
-def _setting_codes(setting: Any, values: Any, n_cases: int) -> np.ndarray:
-    if np.ndim(values) == 0:
-        return np.full(n_cases, setting.code(values))
-    return np.array([setting.code(value) for value in values], dtype=np.float64)
+def _setting_codes(setting: Any, values: Any) -> Any:
+    """One code for all cases, or one each."""
+    return setting.code(values) if np.ndim(values) == 0 else [setting.code(value) for value in values]
 
 
 def call_prepare(model: Model, inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> Any:

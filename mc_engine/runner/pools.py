@@ -65,7 +65,9 @@ class ThreadWorkerPool(WorkerPool):
         self._pool = ThreadPool(self._workers)  # daemon threads: they do not delay the end of the process
 
     def room(self) -> int:
-        return self._workers + 1  # one task in the queue keeps all threads busy
+        # As many more tasks wait in the queue, so that threads are busy while the parts of others are published, one
+        # after another.  A run that is stopped begins none of them.
+        return 2 * self._workers
 
     def begin(self, task: Task) -> None:
         self._pool.apply_async(

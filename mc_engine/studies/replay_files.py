@@ -25,7 +25,8 @@ LARGEST = 1e100  # of any unit; what a flight that is lost holds beyond it, no a
 def write_replay(store: Store, case_id: int, history: pd.DataFrame, picture: bytes) -> list[Path]:
     """Write `RUN/replay/case-<id>.parquet` and `.png`, of which `picture` is the content; the two paths."""
     table, image = _history_file(case_id), f"{REPLAYS}/case-{case_id}.png"
-    content = parquet_bytes(history_table(history, store.manifest.get("quantities", []), store.path / table))
+    rows = history_table(history, store.manifest.get("quantities", []), store.path / table)
+    content = parquet_bytes(rows, history=True)
     derived_files(store.path).write({table: content, image: picture})
     return [store.path / table, store.path / image]
 

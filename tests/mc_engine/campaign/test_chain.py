@@ -7,13 +7,14 @@ from hashlib import sha256
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 from mc_engine.campaign.cases import case_table
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.sections import InputsSection
-from mc_engine.campaign.upstream import link, read_rows
+from mc_engine.campaign.upstream import COMPANION, link, read_rows
 from mc_engine.errors import CampaignError, EngineError, StoreError
 from mc_engine.runner.runner import extend, replay, rerun, resume, run
 from mc_engine.store.journal import encode, scan
@@ -251,6 +252,18 @@ def test_a_case_that_failed_upstream_gives_no_number_and_an_incomplete_run_is_re
     open_store(path).withdraw(open_store(path).parts[0])
     with pytest.raises(StoreError, match="first: is not complete; `mc-engine resume"):
         read_rows(path)
+
+
+def test_a_campaign_is_the_same_whatever_version_of_arrow_wrote_the_copy_of_its_upstream_run(folder, tmp_path):
+    copy = shutil.copytree(folder / "runs" / "second", tmp_path / "second") / COMPANION
+    rows, table = read_rows(copy), pq.read_table(copy)
+    pq.write_table(table, copy, compression="gzip", version="1.0")
+    assert read_rows(copy).digest == rows.digest
+    for name, wrong in (("top_m", 1.0), ("status", "no-stop")):
+        values = rows.table[name].copy()
+        values[7] = wrong
+        assert replace(rows, table={**rows.table, name: values}).digest != rows.digest
+    assert replace(rows, nominal={**rows.nominal, "top_m": 1.0}).digest != rows.digest
 
 
 def test_a_run_to_take_inputs_from_is_refused_where_the_campaign_takes_none(folder, tmp_path):

@@ -1,14 +1,20 @@
 """Which cases are given up, by how often their workers died: with workers that die as told."""
 
+import threading
 from collections import Counter
 
 import pytest
 
+from mc_engine import load_campaign
 from mc_engine.durable_file import leave
-from mc_engine.flight.chunks import Task
+from mc_engine.flight import chunks
+from mc_engine.flight.chunks import Task, run_task
 from mc_engine.runner.dispatch import DIED, NO_MEMORY, Dispatch
+from mc_engine.runner.manifest import columns_of
+from mc_engine.runner.pools import ThreadWorkerPool
 from mc_engine.runner.worker_process import IN_FLIGHT, _note
 from mc_engine.runner.workers import Result, WorkerPool
+from mc_engine.store.parts import CASE_COLUMNS
 
 
 class DyingWorkers(WorkerPool):
@@ -61,3 +67,24 @@ def test_the_only_case_of_a_task_flies_as_often(run):
     [task] = flown_by(workers, run, 1)
     assert [(lost.case_id, lost.reason) for lost in task.lost] == [(0, NO_MEMORY)]
     assert workers.begun == 5
+
+
+def test_a_stopped_run_ends_the_tasks_under_way_and_begins_none_that_waits(run, monkeypatch):
+    campaign, stop, begun = load_campaign("minimal", cases=640), threading.Event(), threading.Semaphore(0)
+    columns = [*CASE_COLUMNS, *columns_of(campaign)]
+    fly = chunks.fly_cases
+    monkeypatch.setattr(chunks, "fly_cases", lambda *given: [begun.release(), stop.wait(60), fly(*given)][2])
+    pool = ThreadWorkerPool(lambda task: run_task(campaign, columns, run, task, stopped=stop.is_set), 2)
+    next_result = pool.next
+
+    def both_begun_then_stopped(patience_s):
+        if not stop.is_set():
+            assert all(begun.acquire(timeout=60) for _ in range(2))
+            stop.set()
+        return next_result(patience_s)
+
+    monkeypatch.setattr(pool, "next", both_begun_then_stopped)
+    tasks = [Task(first, first + 64) for first in range(0, 640, 64)]
+    assert {task.first for task, _ in Dispatch(pool, run).receipts(tasks, stop.is_set)} == {0, 64}
+    pool.close(at_once=True)
+    assert len([*(run / "cases").iterdir()]) == 2

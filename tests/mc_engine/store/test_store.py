@@ -3,6 +3,7 @@ from itertools import pairwise
 import duckdb
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from hypothesis import given, settings
@@ -39,6 +40,16 @@ def test_the_table_is_the_same_however_the_cases_were_cut_and_ordered(tmp_path_f
         assert table[name].tolist() == expected[name].tolist()
     assert store.committed() == [(0, 40)]
     assert store.missing(45) == [(40, 45)]
+
+
+@pytest.mark.parametrize("history", [False, True])
+def test_every_bit_of_a_number_comes_back(history):
+    numbers = np.array([0.0, -0.0, 5e-324, -1.7976931348623157e308, np.inf, -np.inf, np.nan, 1 / 3])
+    numbers.view(np.uint64)[6] |= 0x8000_0000_0000_0123  # a NaN with a sign and a payload
+    counts = np.array([0, -1, 2**63 - 1, -(2**63), 2**53 + 1, 1, 2, 3])
+    read = parts.parquet_table(parts.parquet_bytes(pa.table({"a": numbers, "n": counts}), history))
+    assert read["a"].to_numpy().tobytes() == numbers.tobytes()
+    assert read["n"].to_numpy().tolist() == counts.tolist()
 
 
 def test_a_store_shows_its_folder(store):
