@@ -326,8 +326,7 @@ def bench(
     """How fast a campaign flies on one thread, and how much faster its cases fly side by side than one at a time.
 
     With --methods: every method with the longest step, or roughest tolerance, whose error is that of the model's own
-    method and step, for models with FixedStep. Only the flights are timed: compiling, sampling and storing are not.
-    Nothing is stored.
+    method. Only the flights are timed: compiling, sampling and storing are not. Nothing is stored.
     """
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.flight.kernel import registers, usual_width
@@ -373,8 +372,8 @@ def _echo_methods(campaign: "Campaign", cases: int | None, repeats: int) -> None
         mark = f", {own.case_s / timing.case_s:5.2f} times as fast" if timing is not own else whose
         method, case_us = timing.clock.method, timing.case_s * 1e6
         typer.echo(f"  {method:<7} {timing.setting:<26} error {timing.error:.1e} {case_us:10,.2f} µs a case{mark}")
-    if others and others[0].case_s < own.case_s:
-        typer.echo(f"the fastest: clock={others[0].declaration}")
+    ahead = others and others[0].case_s < own.case_s
+    typer.echo(f"the fastest: clock={others[0].declaration}" if ahead else "the fastest: the model's own")
 
 
 def _bench_card(campaign: "Campaign", cases: int | None) -> None:

@@ -3,29 +3,33 @@
 Compiling, or loading the compiled kernel, is timed separately.  The builds take turns at short flights and the shortest
 time of each counts, so that other work on the machine has little influence.
 
-`compare_methods` seeks the integration method that is fastest at the error of the model's own method and step.  Every
-other method is tried, on a fixed grid from long steps to short ones, or from rough tolerances to fine ones, until its
-error is no larger than the model's own.  The error is the largest difference of a metric from a reference flight, in
-any case, as a fraction of that metric's largest magnitude.  The reference is flown by DOP853 to a tolerance of 1e-13.
-The metric that has it is named: one that is only rounding, such as the altitude at the ground, has an error near 1.
-Samples of the control stay where they are: a model with `control` is tried with whole numbers of steps between them.
+`compare_methods` seeks the integration method that is fastest at the error of the model's own method, with its step or
+tolerances.  Every other method that can fly the model is tried, on a fixed grid from long steps to short ones, or from
+rough tolerances to fine ones, until its error is no larger than the model's own.  The error is the largest difference
+of a metric from a reference flight, in any case, as a fraction of that metric's largest magnitude; the metric that has
+it is named.  Metrics that are but the rounding of larger numbers, such as the altitude at the ground, are left out.
+The reference is flown by DOP853 to a tolerance of 1e-13.  Samples of the control stay where they are: a model with
+`control` is tried with whole numbers of steps between them.
 """
 
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from mc_engine.campaign.cases import case_table, full_inputs, is_endless
+from mc_engine.campaign.columns import END_TIME
 from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import ModelError
 from mc_engine.flight import flight
-from mc_engine.flight.kernel import usual_width
+from mc_engine.flight.kernel import clock_number, usual_width
 from mc_engine.model.fields import AdaptiveStep, FixedStep, uses_rates
 from mc_engine.model.record import Model, compiled_model
 from mc_engine.model.rules import METHODS
+from mc_engine.units import UNITS
 
 _MOST_CASES = 256
 _SHORT = 0.15  # s, about, of a flight one case at a time; a longer one is only disturbed more often
@@ -34,8 +38,12 @@ _SLOWEST = 12  # times that a case takes longer alone, at most: to guess from a 
 
 _TIGHT = 1e-13
 _TOLERANCES = tuple(10.0 ** (-k / 4) for k in range(16, 53))
-_LONGER, _SHORTER = 28, 8  # steps are tried up to 2**7 times longer and 2**2 times shorter, in quarters of an octave
+# steps are tried so many quarters of an octave longer than the model's own, and so many shorter
+_LONGER, _SHORTER = 28, 8
+# of a model that chooses its steps so many around this part of the longest flight; so many such flights are no limit
+_PART, _AROUND, _NO_LIMIT = 1 / 512, 24, 1e4
 _ROUNDING = 1e-14  # no error of a metric is told apart from zero below
+_ROUNDED = 1e-12  # of the largest number of the same quantity: a metric below is but its rounding
 
 Clock = FixedStep | AdaptiveStep
 
@@ -149,8 +157,7 @@ class MethodTiming:
     def setting(self) -> str:
         """Its step or tolerance."""
         if isinstance(self.clock, FixedStep):
-            steps = round(float(self.clock.until) / float(self.clock.step))
-            return f"{steps:,} steps of {self.clock.step:.4g} s"
+            return f"steps of {self.clock.step:.4g} s"
         return f"tolerance {self.clock.rtol:.1e}"
 
     @property
@@ -165,16 +172,12 @@ def compare_methods(campaign: Campaign, n_cases: int | None, repeats: int) -> li
     """The methods that reach the error of the model's own, which is the first; the others from fast to slow.
 
     n_cases, repeats : of the flights that are timed, see `campaign_flight` and `measure`.
-    Raises ModelError if the model chooses its steps itself.
     """
-    few = campaign_flight(campaign, _TRIAL)
-    if not isinstance(few.model.clock, FixedStep):
-        raise ModelError("methods are compared for models on a fixed grid, FixedStep; this one chooses its steps")
-    trials = _Trials(few)
+    trials = _Trials(campaign_flight(campaign, _TRIAL))
     error, metric = trials.largest_error(trials.own)
     known: list[tuple[Clock, float]] = [(trials.own, error)]
     if not np.isfinite(known[0][1]):
-        raise ModelError("methods are not compared: by the model's own, cases end otherwise than by small steps")
+        raise ModelError("methods are not compared: by the model's own, cases end otherwise than by the finest steps")
     for clocks in trials.ladders():
         found = _first_within(trials, clocks, max(known[0][1], _ROUNDING))
         known += [found] if found else []
@@ -199,51 +202,85 @@ def _first_within(trials: "_Trials", clocks: Iterator[Clock], most: float) -> tu
     return before
 
 
+def _in_numbers(clock: Clock, settings: Any) -> Clock:
+    """The clock with numbers in place of names of settings, and functions of them."""
+    if isinstance(clock, FixedStep):
+        n_steps, step, every = flight.grid_of(clock, settings)
+        return replace(clock, step=step, until=n_steps * step, control_every=every)
+    until, rtol, period = (clock_number(item, settings) for item in (clock.until, clock.rtol, clock.control_period))
+    return replace(clock, until=until, rtol=rtol, control_period=period)
+
+
+def _kind(clock: Clock) -> str:
+    """Clocks of a kind have the same kernel."""
+    return clock.method if isinstance(clock, FixedStep) else "adaptive"
+
+
 class _Trials:
     """Flights of a few cases by other clocks, and their errors."""
 
     def __init__(self, cases: Flight):
-        self.cases, clock = cases, cases.model.clock
-        assert isinstance(clock, FixedStep)
+        self.cases, model = cases, cases.model
         self._ids = np.arange(cases.n_cases)
-        flown = cases.model, cases.inputs, self._ids, cases.seed
-        codes = flight.bound_flight(*flown, folder=cases.folder, width=usual_width(cases.model))[2]
-        self.n_steps, step, every = flight.grid_of(clock, flight.settings_of(cases.model, codes))
-        self.until = self.n_steps * step
-        self.every = every if cases.model.control is not None else 0  # steps from sample to sample; 0: no samples
-        self.own = replace(clock, step=step, until=self.until, control_every=every)
-        self._models = {self.own.method: cases.model}
+        flown = model, cases.inputs, self._ids, cases.seed
+        codes = flight.bound_flight(*flown, folder=cases.folder, width=usual_width(model))[2]
+        self.own = _in_numbers(model.clock, flight.settings_of(model, codes))
+        self._models = {_kind(self.own): model}
         own = self._flown(self.own)
-        sizes = [np.nanmax(abs(own[f"end_{state.name}"] * state.si_factor)) for state in cases.model.states]
+        if isinstance(self.own, FixedStep):
+            self.flight_s, period = float(self.own.until), float(self.own.step) * float(self.own.control_every)
+        else:
+            self.flight_s, period = float(np.nanmax(own[END_TIME])), clock_number(self.own.control_period, None)
+        self.period = period if model.control is not None else np.inf
+        sizes = [np.nanmax(abs(own[f"end_{state.name}"] * state.si_factor)) for state in model.states]
         self._scales = np.array([size if np.isfinite(size) and size > 0.0 else 1.0 for size in sizes])
         self._true = self._flown(self._adaptive("dop853", _TIGHT))
+        self._least = self._sizes_of_rounding()
 
     def ladders(self) -> Iterator[Iterator[Clock]]:
         """Of every other method its clocks, from rough to fine."""
-        for method in METHODS["FixedStep"]:
-            own = replace(self.own, method=method)
-            if method != self.own.method and (self.own.rates or not uses_rates(own)):
-                yield (replace(own, step=step, control_every=every) for step, every in self._grids())
+        # far beyond the longest flight a limit is none, and short steps may be too many until then
+        until = min(float(self.own.until), _NO_LIMIT * self.flight_s)
+        grid = self.own if isinstance(self.own, FixedStep) else FixedStep(self.flight_s, until)
+        for method in METHODS["FixedStep"] if not self.cases.model.phases else ():
+            fixed = replace(grid, method=method)
+            if method != self.own.method and (fixed.rates or not uses_rates(fixed)):
+                yield (replace(fixed, step=step, control_every=every) for step, every in self._grids())
         for method in METHODS["AdaptiveStep"]:
-            yield (self._adaptive(method, tolerance) for tolerance in _TOLERANCES)
+            if method != self.own.method:
+                yield (self._adaptive(method, tolerance) for tolerance in _TOLERANCES)
 
     def _grids(self) -> Iterator[tuple[float, int]]:
         """(step [s], steps from sample to sample) from long steps to short ones, which divide the flight or period."""
-        parts = self.every or self.n_steps
-        whole = self.until * parts / self.n_steps
-        quarters = range(-_LONGER, _SHORTER + 1)
-        for n in sorted({max(1, round(parts * 2.0 ** (quarter / 4))) for quarter in quarters}):
-            yield whole / n, n if self.every else 1
+        whole, near, quarters = min(self.period, self.flight_s), _PART * self.flight_s, range(-_AROUND, _AROUND + 1)
+        if isinstance(self.own, FixedStep):
+            near, quarters = float(self.own.step), range(-_LONGER, _SHORTER + 1)
+        for n in sorted({max(1, round(whole / near * 2.0 ** (quarter / 4))) for quarter in quarters}):
+            yield whole / n, n if self.period < np.inf else 1
 
     def _adaptive(self, method: str, tolerance: float) -> AdaptiveStep:
-        """A clock that samples where the model's own does; absolute tolerances by the size of the states in the end."""
-        period = self.until * self.every / self.n_steps if self.every else np.inf
+        """A clock that samples where the model's own does; absolute tolerances by the size of the states in the end,
+        or by the model's own."""
+        if isinstance(self.own, AdaptiveStep):
+            own = np.broadcast_to(self.own.atol, len(self._scales)) / float(self.own.rtol)
+            rtol, *atol = (float(f"{tolerance * scale:.1e}") for scale in (1.0, *own))
+            return replace(self.own, rtol=rtol, atol=tuple(atol), method=method)
         rtol, *atol = (float(f"{tolerance * scale:.1e}") for scale in (1.0, *self._scales))
-        return AdaptiveStep(self.until, rtol, tuple(atol), period, method)
+        return AdaptiveStep(self.own.until, rtol, tuple(atol), self.period, method)
+
+    def _sizes_of_rounding(self) -> dict[str, float]:
+        """By quantity, such as length, how small a metric is in SI that is but the rounding of larger numbers."""
+        largest: dict[str, float] = {}
+        model = self.cases.model
+        sizes = [(metric, np.nanmax(abs(self._true[metric.name]), initial=0.0)) for metric in model.metrics]
+        states = [(state, size / state.si_factor) for state, size in zip(model.states, self._scales, strict=True)]
+        for item, size in (*sizes, *states):
+            quantity = UNITS[item.unit].quantity
+            largest[quantity] = max(largest.get(quantity, 0.0), _ROUNDED * size * item.si_factor)
+        return largest
 
     def _flown(self, clock: Clock) -> dict[str, np.ndarray]:
-        kind = clock.method if isinstance(clock, FixedStep) else "adaptive"
-        model = self._models.setdefault(kind, replace(self.cases.model, clock=clock))
+        model = self._models.setdefault(_kind(clock), replace(self.cases.model, clock=clock))
         cases = self.cases
         return flight.fly(model, cases.inputs, self._ids, cases.seed, folder=cases.folder, clock=clock)
 
@@ -262,5 +299,7 @@ class _Trials:
             if (np.isnan(value) != np.isnan(true)).any():
                 return np.inf, metric.name
             size = np.nanmax(abs(true), initial=0.0) or 1.0
+            if size * metric.si_factor <= self._least[UNITS[metric.unit].quantity]:
+                continue
             worst = max(worst, (float(np.nanmax(abs(value - true), initial=0.0) / size), metric.name))
         return worst
