@@ -34,7 +34,7 @@ _PROFILE = np.array((
 # half of each variance is of the small scale, half of the large one: correlation lengths of first-order Gauss-Markov
 # processes [m]
 SMALL_SCALE, LARGE_SCALE = 7.5e3, 20e3
-BLOCK = 1024  # cases drawn at once: their deviates stay in the processor's cache
+BLOCK = 256  # cases drawn at once: their deviates stay in the processor's cache
 
 # value and slope [1/m] of the logarithm of the density over the standard; winds [m/s] and their slopes [1/s]
 Weather = namedtuple("Weather", "density density_slope east east_slope north north_slope")
@@ -57,10 +57,15 @@ def normal_deviates(draw: np.ndarray, count: int) -> np.ndarray:
     """
     key = (draw * 2.0**53).astype(np.uint64)
     z = (key << np.uint64(11)) + np.arange(1, count + 1, dtype=np.uint64)[:, None] * np.uint64(0x9E3779B97F4A7C15)
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    z = z ^ (z >> np.uint64(31))
-    return scipy.special.ndtri(((z >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52)
+    other = np.empty_like(z)  # all in two arrays: more would not stay in the cache
+    for shift, multiplier in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        z ^= np.right_shift(z, np.uint64(shift), out=other)
+        z *= np.uint64(multiplier)
+    z ^= np.right_shift(z, np.uint64(31), out=other)
+    z >>= np.uint64(12)
+    share = np.add(z, 0.5, out=other.view(np.float64))
+    share *= 2.0**-52
+    return scipy.special.ndtri(share, out=share)
 
 
 def gauss_markov(deviates: np.ndarray, length: float) -> np.ndarray:
