@@ -221,14 +221,20 @@ def append_synced(root: Path, name: str, at: int, content: bytes) -> None:
 
 def publish(root: Path, temporary: str, name: str) -> None:
     """Rename a synced file within its folder, replacing a file of that name; on return the name is on the disk."""
-    with _parent(root, name) as (folder, last):
-        before, held = temporary.rpartition("/")[2], folder.descriptor
-        try:
-            with _refusing_folder(folder.path / last):
-                os.replace(folder.of(before), folder.of(last), src_dir_fd=held, dst_dir_fd=held)
-        except (OSError, StoreError):
-            _discard(root, temporary)
-            raise
+    publish_all(root, [(temporary, name)])
+
+
+def publish_all(root: Path, names: Sequence[tuple[str, str]]) -> None:
+    """Rename synced files within one folder, as `publish`; the folder is synced once.  names : (temporary, final)."""
+    with _parent(root, names[0][1]) as (folder, _):
+        for temporary, name in names:
+            before, last, held = temporary.rpartition("/")[2], name.rpartition("/")[2], folder.descriptor
+            try:
+                with _refusing_folder(folder.path / last):
+                    os.replace(folder.of(before), folder.of(last), src_dir_fd=held, dst_dir_fd=held)
+            except (OSError, StoreError):
+                _discard(root, temporary)
+                raise
         _sync_names(folder)
 
 

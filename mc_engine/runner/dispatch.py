@@ -50,8 +50,8 @@ class Dispatch:
         self._unnoted: Counter[int] = Counter()  # deaths without a record, by the first case of the task
         self._n_deaths, self._any_completed = 0, False
 
-    def receipts(self, tasks: Iterable[Task], stopped: Callable[[], bool]) -> Iterator[tuple[Task, Written]]:
-        """Each task with the part that was written for it, in the order of completion.
+    def receipts(self, tasks: Iterable[Task], stopped: Callable[[], bool]) -> Iterator[list[tuple[Task, Written]]]:
+        """Each task with the part that was written for it, in the order of completion; all that have come in at once.
 
         Once `stopped()` is true no further task begins; those under way complete as long as there are workers.
         Raises WorkersLost if the workers cannot be kept alive.
@@ -64,18 +64,31 @@ class Dispatch:
                 if stopped() and (self._leaves_now() or self._pool.without_workers_s() > DRAIN_S):
                     return
                 continue
-            self._under_way -= 1
-            self._exclusive = self._exclusive and self._under_way > 0
-            if result.died:
-                self._on_worker_death(result)
-            elif isinstance(result.error, RunStopped):
-                continue
-            elif result.written is None:
-                raise result.error or AssertionError(result)
-            else:
-                self._any_completed = True
-                self._fill(stopped)  # before the caller handles the part, so that no worker is idle meanwhile
-                yield result.task, result.written
+            done: list[tuple[Task, Written]] = []
+            try:
+                while result is not None:
+                    done += self._written(result)
+                    result = self._pool.next(0.0)
+            except Exception:
+                if done:
+                    yield done  # they have come in before the error
+                raise
+            self._fill(stopped)  # before the caller handles the parts, so that no worker is idle meanwhile
+            if done:
+                yield done
+
+    def _written(self, result: Result) -> list[tuple[Task, Written]]:
+        """The task with its part, if that was written."""
+        self._under_way -= 1
+        self._exclusive = self._exclusive and self._under_way > 0
+        if result.died:
+            self._on_worker_death(result)
+        elif result.written is not None:
+            self._any_completed = True
+            return [(result.task, result.written)]
+        elif not isinstance(result.error, RunStopped):
+            raise result.error or AssertionError(result)
+        return []
 
     def _leaves_now(self) -> bool:
         """Whether tasks under way are left; threads end by themselves, and are waited for."""

@@ -65,8 +65,8 @@ class ThreadWorkerPool(WorkerPool):
         self._pool = ThreadPool(self._workers)  # daemon threads: they do not delay the end of the process
 
     def room(self) -> int:
-        # As many more tasks wait in the queue, so that threads are busy while the parts of others are published, one
-        # after another.  A run that is stopped begins none of them.
+        # As many more tasks wait in the queue, so that threads are busy while the parts of others are published.  A run
+        # that is stopped begins none of them.
         return 2 * self._workers
 
     def begin(self, task: Task) -> None:

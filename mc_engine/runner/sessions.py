@@ -6,7 +6,7 @@ One process at a time is the writer of a run; it commits the parts that the work
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from numbers import Integral
@@ -36,6 +36,8 @@ from mc_engine.store.parts import Written, problem_of
 from mc_engine.store.repair import mend_journal, withdraw_damaged
 from mc_engine.store.run_files import JOURNAL, NOMINAL_CASE, SENSITIVITY, is_run_directory
 from mc_engine.store.store import Store, create_store
+
+Done = Sequence[tuple[Task, Written]]  # what tasks wrote
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,11 @@ def _fly_missing(store: Store, campaign: Campaign, session: Session, repair: boo
     store.note("started", backend=session.backend.name, workers=session.workers, chunk=size, missing=missing)
     begin = time.perf_counter()
     nominal = bool(_nominal_problem(store))
-    begun = _run_tasks(store, campaign, session, nominal, tasks, lambda _, part: store.publish(part), stop.is_set)
+
+    def commit(done: Done) -> None:
+        store.publish(*(written for _, written in done))
+
+    begun = _run_tasks(store, campaign, session, nominal, tasks, commit, stop.is_set)
     if (problem := _nominal_problem(store)) or store.missing():
         raise _interrupted(store, f"; {problem}" if store.nominal_part and problem else "")
     remove_logs(store.path)
@@ -128,15 +134,16 @@ def fly_failed(store: Store, campaign: Campaign, session: Session) -> Store:
         nominal = bool(_nominal_problem(store)) or store.nominal()["status"] != STATUS_NAME[OK]
         remaining = {task.first for task in tasks} | ({NOMINAL_CASE} if nominal else set())
 
-        def commit(task: Task, written: Written) -> None:
-            remaining.discard(task.first)
-            before = task.base or store.nominal_part
-            if before is not None and written.part.sha256 == before.sha256:
-                remove_file(store.path, written.temporary)
-            elif task.base is not None:
-                store.replace(task.base, written)
-            else:
-                store.publish(written)
+        def commit(done: Done) -> None:
+            for task, written in done:
+                remaining.discard(task.first)
+                before = task.base or store.nominal_part
+                if before is not None and written.part.sha256 == before.sha256:
+                    remove_file(store.path, written.temporary)
+                elif task.base is not None:
+                    store.replace(task.base, written)
+                else:
+                    store.publish(written)
 
         _run_tasks(store, campaign, session, nominal, tasks, commit, stop.is_set)
         if remaining:
@@ -152,7 +159,7 @@ def _run_tasks(
     session: Session,
     nominal: bool,
     tasks: list[Task],
-    commit: Callable[[Task, Written], None],
+    commit: Callable[[Done], None],
     stopped: Callable[[], bool],
 ) -> float:
     """Run the tasks in a worker pool, commit each part that is written, and report the progress.
@@ -174,14 +181,15 @@ def _run_tasks(
             in_threads(lambda flyer: flyer.make_ready(), [flyer])
         pool = pool_of(session.backend, store, campaign, session.workers, stopped)
         dispatch = Dispatch(pool, store.path, session.backend.case_seconds, leaves, flyer.most_workers)
-        for task, written in dispatch.receipts([NOMINAL_TASK] if nominal else [], stopped):
-            commit(task, written)
+        for receipts in dispatch.receipts([NOMINAL_TASK] if nominal else [], stopped):
+            commit(receipts)
         begun = time.perf_counter()
         report(done, total, failed)
-        for task, written in dispatch.receipts(tasks, stopped):
-            commit(task, written)
-            done += written.part.rows - (task.base.rows if task.base else 0)
-            failed += _failed(written.part.status) - (_failed(task.base.status) if task.base else 0)
+        for receipts in dispatch.receipts(tasks, stopped):
+            commit(receipts)
+            for task, written in receipts:
+                done += written.part.rows - (task.base.rows if task.base else 0)
+                failed += _failed(written.part.status) - (_failed(task.base.status) if task.base else 0)
             report(done, total, failed)
         at_once = leaves and stopped()
         return begun

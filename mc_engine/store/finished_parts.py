@@ -7,7 +7,7 @@ whose bytes match is complete, and its cases are not flown again.
 import json
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from hashlib import sha256
@@ -23,33 +23,38 @@ if TYPE_CHECKING:
     from mc_engine.store.store import Store
 
 _ASIDE = re.compile(r"\.(part-[^/]*\.parquet)\.[0-9a-f]{8}\.([0-9a-f]{32})\.tmp")
-_RECEIPT = "cases/.receipt.tmp"
+_RECEIPTS = "cases/.receipt.tmp"
 
 
-def leave_receipt(run: Path, part: Part) -> None:
-    """Write which part is renamed and recorded next.
+def leave_receipts(run: Path, parts: Sequence[Part]) -> None:
+    """Write which parts are renamed and recorded next.
 
-    Not synced, and errors are ignored: without it a kill can cost one part, which is then flown again.
+    Not synced, and errors are ignored: without it a kill can cost these parts, which are then flown again.
     """
     with suppress(StoreError):
-        leave(run, _RECEIPT, json.dumps(asdict(part)).encode())
+        leave(run, _RECEIPTS, json.dumps([asdict(part) for part in parts]).encode())
 
 
 def count_finished(store: "Store") -> None:
     """Commit the complete parts that a killed writer left unrecorded.  The caller holds the lock."""
+    counted: list[Written] = []
     for written in finished_parts(store.path):
-        cases = (written.part.first, written.part.stop)
-        if store.missing(range(*cases)) == [cases] and cases[1] <= store.wanted.stop:
-            store.publish(written)
+        first, stop = written.part.first, written.part.stop
+        is_known = any(first < other.part.stop and other.part.first < stop for other in counted)
+        if not is_known and store.missing(range(first, stop)) == [(first, stop)] and stop <= store.wanted.stop:
+            counted.append(written)
+    if counted:
+        store.publish(*counted)
 
 
 def finished_parts(run: Path) -> Iterator[Written]:
     """The complete, unrecorded parts of `run`; on return their bytes are synced to the disk."""
-    noted: Part | None = None  # read first: to commit a part writes another receipt
-    with suppress(StoreError, ValueError, RecursionError):  # there is none, or it is incomplete
-        noted = receipt_of(json.loads(read_inside(run, _RECEIPT, limit=MOST_OF_TEXT)))
-    if noted is not None and (part := _whole(run, noted.file, noted.file, noted.sha256)):
-        yield Written(part, part.file)
+    noted: list[Part] = []
+    with suppress(StoreError, ValueError, TypeError, RecursionError):  # there are none, or they are incomplete
+        noted = [receipt_of(facts) for facts in json.loads(read_inside(run, _RECEIPTS, limit=MOST_OF_TEXT))]
+    for receipt in noted:
+        if part := _whole(run, receipt.file, receipt.file, receipt.sha256):
+            yield Written(part, part.file)
     for name in names_in(run, "cases"):
         match = _ASIDE.fullmatch(name)
         if match is not None and (part := _whole(run, f"cases/{name}", f"cases/{match[1]}", match[2])):

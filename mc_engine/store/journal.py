@@ -121,20 +121,21 @@ class Journal:
         self.certain = True  # False after an append that failed: the file may hold a line that is not in `entries`
         self._length, self._size = lines.length, len(content)  # up to the last valid line, and in all
 
-    def append(self, event: str, facts: dict[str, Any]) -> Entry:
-        """Write and sync one line.  After an error the line is not valid, and `append` may be tried again."""
-        number = len(self.entries) + 1
-        line = encode(number, utc_now(), event, facts)
-        entry = decode(line[:-1])
-        assert entry is not None  # just encoded
+    def append(self, event: str, *facts: dict[str, Any]) -> list[Entry]:
+        """Write lines of one event and sync them.  After an error they are not valid, and may be appended again."""
+        number, at = len(self.entries) + 1, utc_now()
+        lines = [encode(number + i, at, event, one) for i, one in enumerate(facts)]
+        entries = [entry for line in lines if (entry := decode(line[:-1]))]
+        assert len(entries) == len(lines)  # just encoded
+        content = b"".join(lines)
         if self.certain and os.path.getsize(self.path) != self._size:
             raise StoreError(f"{self.path}: another process has written here; this process stops and writes nothing")
         self.certain = False
-        append_synced(self.path.parent, self.path.name, self._length, line)  # over a torn line, or one that failed
-        self._length = self._size = self._length + len(line)
-        self.entries.append(entry)
+        append_synced(self.path.parent, self.path.name, self._length, content)  # over a torn line, or one that failed
+        self._length = self._size = self._length + len(content)
+        self.entries += entries
         self.torn, self.certain = False, True
-        return entry
+        return entries
 
 
 def damaged_line(path: Path, number: int, why: str) -> StoreError:

@@ -22,7 +22,7 @@ from mc_engine import durable_file as disk
 from mc_engine.errors import StoreError
 from mc_engine.shell_words import shell_word
 from mc_engine.store import parts
-from mc_engine.store.finished_parts import count_finished, leave_receipt
+from mc_engine.store.finished_parts import count_finished, leave_receipts
 from mc_engine.store.histories import history_columns, history_table, read_histories
 from mc_engine.store.journal import Entry, Journal, damaged_line, encode, utc_now
 from mc_engine.store.manifest_file import cases_in, columns_in, edited_files, manifest_bytes, parse_manifest
@@ -137,9 +137,10 @@ class Store:
             raise damaged_line(self.path / JOURNAL, number, why)
         self._created = self._journal.entries[0].facts
 
-    def _record(self, event: str, facts: dict[str, Any]) -> None:
+    def _record(self, event: str, *facts: dict[str, Any]) -> None:
         self._lock.check()
-        self._counted.take(self._journal.append(event, facts))
+        for entry in self._journal.append(event, *facts):
+            self._counted.take(entry)
 
     @property
     def campaign_text(self) -> str:
@@ -297,16 +298,21 @@ class Store:
             self._rename(written)
             self._record("part", asdict(written.part))
 
-    def publish(self, written: Written) -> None:
-        """Commit a part that a worker wrote by `parts.write_aside`; on return it survives a power cut."""
+    def publish(self, *written: Written) -> None:
+        """Commit parts that workers wrote by `parts.write_aside`; on return they survive a power cut.
+
+        The disk is waited for as long for many as for one.
+        """
         with self.lock():
-            if written.part.file == NOMINAL:
-                self._publish_nominal(written)
+            if written[0].part.file == NOMINAL:
+                self._publish_nominal(*written)
                 return
-            self._refuse_overlap(written.part.first, written.part.rows)
-            leave_receipt(self.path, written.part)
-            self._rename(written)
-            self._record("part", asdict(written.part))
+            receipts = sorted((one.part for one in written), key=lambda part: part.first)
+            for part, before in zip(receipts, (None, *receipts), strict=False):
+                self._refuse_overlap(part.first, part.rows, before.stop if before else 0)
+            leave_receipts(self.path, receipts)
+            self._rename(*written)
+            self._record("part", *map(asdict, receipts))
 
     def _publish_nominal(self, written: Written) -> None:
         if self.nominal_part is not None:
@@ -326,13 +332,14 @@ class Store:
         with suppress(StoreError):  # it is withdrawn already, and the next writer tries again
             disk.remove_file(self.path, before.file)
 
-    def _rename(self, written: Written) -> None:
-        if not (self.path / written.temporary).exists():
-            raise StoreError(
-                f"{self.path / written.part.file}: a worker has written it, and it is not here; all workers must see "
-                "the run directory under the same path"
-            )
-        disk.publish(self.path, written.temporary, written.part.file)
+    def _rename(self, *written: Written) -> None:
+        for one in written:
+            if not (self.path / one.temporary).exists():
+                raise StoreError(
+                    f"{self.path / one.part.file}: a worker has written it, and it is not here; all workers must see "
+                    "the run directory under the same path"
+                )
+        disk.publish_all(self.path, [(one.temporary, one.part.file) for one in written])
 
     def withdraw(self, part: Part) -> None:
         """Withdraw a part, so that its cases are missing again."""
@@ -340,8 +347,9 @@ class Store:
             self._record("part-withdrawn", {"file": part.file})
             self._remove(part)
 
-    def _refuse_overlap(self, first: int, count: int) -> None:
-        if count > 0 and self.missing(range(first, first + count)) != [(first, first + count)]:
+    def _refuse_overlap(self, first: int, count: int, least: int = 0) -> None:
+        wanted = [(first, first + count)]
+        if count > 0 and (first < least or self.missing(range(*wanted[0])) != wanted):
             raise StoreError(f"{self.path}: some of the cases {first} to {first + count - 1} are committed already")
 
     def note(self, event: str, /, **facts: Any) -> None:

@@ -18,10 +18,10 @@ from mc_engine.store.writer_lock import WriterLock
 def line_before_part(patch):
     """The journal counts a part before the part has its name."""
 
-    def publish(self, written):
+    def publish(self, *written):
         with self.lock():
-            self._record("part", asdict(written.part))
-            self._name(written)
+            self._record("part", *(asdict(one.part) for one in written))
+            self._rename(*written)
 
     patch(store.Store, "publish", publish)
 

@@ -135,15 +135,16 @@ def fly(
             starts.append(_load_in_workers(cluster, campaign, out))
         parts = done // chunk
         at_part(parts)
-        if parts == 2 * workers or (done == total and seen):
+        if (parts >= 2 * workers and not seen) or (done == total and seen):
             seen.append(clocks(parts))
 
     publish, begin_task = Store.publish, ClusterWorkerPool.begin
 
-    def timed_publish(store: Store, written: Any) -> None:
+    def timed_publish(store: Store, *written: Any) -> None:
         wall, processor = time.perf_counter(), time.thread_time()
-        publish(store, written)
-        waits.append(time.perf_counter() - wall - (time.thread_time() - processor))
+        publish(store, *written)
+        waited = time.perf_counter() - wall - (time.thread_time() - processor)
+        waits.extend([waited / len(written)] * len(written))
 
     def counted_begin(pool: ClusterWorkerPool, task: Any) -> None:
         if task is not NOMINAL_TASK:

@@ -51,7 +51,7 @@ def run(tmp_path):
 
 
 def flown_by(workers, run, cases=10):
-    return [task for task, _ in Dispatch(workers, run).receipts([Task(0, cases)], lambda: False)]
+    return [task for done in Dispatch(workers, run).receipts([Task(0, cases)], lambda: False) for task, _ in done]
 
 
 def test_a_case_is_given_up_when_its_worker_dies_twice_while_it_flies_alone(run):
@@ -67,6 +67,21 @@ def test_the_only_case_of_a_task_flies_as_often(run):
     [task] = flown_by(workers, run, 1)
     assert [(lost.case_id, lost.reason) for lost in task.lost] == [(0, NO_MEMORY)]
     assert workers.begun == 5
+
+
+def test_parts_that_came_in_before_an_error_are_handed_over_at_once_and_before_it(run):
+    class Quick(DyingWorkers):
+        def room(self):
+            return 4
+
+        def begin(self, task):
+            failed = OSError("no room") if task.first == 20 else None
+            self._results.put(Result(task, written=None if failed else task, error=failed))
+
+    receipts = Dispatch(Quick(run, {}), run).receipts([Task(first, first + 10) for first in (0, 10, 20, 30)], lambda: 0)
+    assert [task.first for task, _ in next(receipts)] == [0, 10]
+    with pytest.raises(OSError, match="no room"):
+        next(receipts)
 
 
 def test_a_stopped_run_ends_the_tasks_under_way_and_begins_none_that_waits(run, monkeypatch):
@@ -85,6 +100,7 @@ def test_a_stopped_run_ends_the_tasks_under_way_and_begins_none_that_waits(run, 
 
     monkeypatch.setattr(pool, "next", both_begun_then_stopped)
     tasks = [Task(first, first + 64) for first in range(0, 640, 64)]
-    assert {task.first for task, _ in Dispatch(pool, run).receipts(tasks, stop.is_set)} == {0, 64}
+    receipts = Dispatch(pool, run).receipts(tasks, stop.is_set)
+    assert {task.first for done in receipts for task, _ in done} == {0, 64}
     pool.close(at_once=True)
     assert len([*(run / "cases").iterdir()]) == 2

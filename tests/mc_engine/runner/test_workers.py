@@ -26,5 +26,6 @@ def _page_faults(memory: str) -> int:
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other allocators have limits of their own")
 def test_the_arrays_of_a_chunk_take_the_memory_of_the_chunk_before():
-    given_back, kept = _page_faults("given back"), _page_faults("kept")
-    assert kept < 100 < given_back
+    assert _page_faults("given back") > 100
+    # on a busy machine one process in some hundred did not keep it
+    assert min(_page_faults("kept") for _ in range(3)) < 100

@@ -5,7 +5,10 @@ import json
 import pytest
 from small_run import block
 
-from mc_engine.store import parts
+from mc_engine import durable_file
+from mc_engine.errors import StoreError
+from mc_engine.store import journal, parts
+from mc_engine.store.opening import open_store
 from mc_engine.store.verification import RESUME, damage
 from tests.mc_engine.command_line.cart import call
 
@@ -54,6 +57,36 @@ def test_a_part_that_a_killed_worker_wrote_counts_if_every_byte_is_right(killed,
     with killed.lock():
         assert killed.committed() == [(0, 20 if harm == "none" else 10)]
     assert damage(killed.path) == []
+
+
+@pytest.mark.parametrize("stopped_at", ["append_synced", "publish_all"])
+def test_parts_that_are_published_together_all_count_after_a_kill(killed, monkeypatch, stopped_at):
+    written = [parts.write_aside(killed.path, killed.columns, first, 10, block(first, 10)) for first in (30, 10, 20)]
+
+    def kill(*arguments):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(journal if stopped_at == "append_synced" else durable_file, stopped_at, kill)
+        with pytest.raises(KeyboardInterrupt), killed.lock():
+            killed.publish(*written)
+    (killed.path / ".lock").write_text(json.dumps({"pid": 1, "host": "gone", "since": "then"}))
+    again = open_store(killed.path)
+    assert again.committed() == [(0, 10)]
+    with again.lock():
+        assert again.committed() == [(0, 40)]
+    assert again.cases()["ve_pct"].tolist() == block(0, 40)["ve_pct"].tolist()
+    assert damage(killed.path) == []
+
+
+def test_of_parts_that_overlap_none_is_published(store):
+    with store.lock():
+        written = [parts.write_aside(store.path, store.columns, first, 10, block(first, 10)) for first in (0, 20, 25)]
+        with pytest.raises(StoreError, match="some of the cases 25 to 34 are committed already"):
+            store.publish(*written)
+        assert store.committed() == []
+        store.publish(*written[:2])
+    assert [(part.first, part.stop) for part in store.parts] == [(0, 10), (20, 30)]
 
 
 def test_a_part_without_a_line_is_damage_where_no_writer_was_killed(killed):
