@@ -146,7 +146,8 @@ def _at_exit() -> None:
 def in_threads(work: Callable[[S], T], items: Sequence[S], workers: int = 1) -> list[T]:
     """What `work` returns for each of the items, by up to `workers` daemon threads, which delay no end of the process.
 
-    Raises the first that `work` raises; items not begun by then are left.  A signal is handled at once.
+    Raises the first that `work` raises, once those under way have ended; items not begun by then are left.  A signal is
+    handled at once.
     """
     from concurrent.futures import FIRST_EXCEPTION, Future, wait
 
@@ -159,11 +160,15 @@ def in_threads(work: Callable[[S], T], items: Sequence[S], workers: int = 1) -> 
                 _settle(*queue.popleft())
 
     try:
-        for _ in range(min(workers, len(items))):
-            threading.Thread(target=work_off, daemon=True).start()
+        threads = [threading.Thread(target=work_off, daemon=True) for _ in range(min(workers, len(items)))]
+        for thread in threads:
+            thread.start()
         while True:
             done, waiting = wait(outcomes, _LOOK_EVERY_S, FIRST_EXCEPTION)  # Windows handles no signal in one long wait
             if failed := [outcome for outcome in done if outcome.exception() is not None]:
+                queue.clear()
+                while any(thread.is_alive() for thread in threads):
+                    time.sleep(_LOOK_EVERY_S / 20)
                 failed[0].result()
             if not waiting:
                 return [outcome.result() for outcome in outcomes]

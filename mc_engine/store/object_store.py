@@ -25,6 +25,7 @@ from typing import Any, Self
 from mc_engine.durable_file import disk_errors, is_temporary, make_folder, read_file, sync_folder, write_durably
 from mc_engine.errors import EngineError, StoreError, UsageError
 from mc_engine.extras import how_to_install
+from mc_engine.interruption import in_threads
 from mc_engine.shell_words import shell_word
 from mc_engine.store.counted_files import CountedFiles
 from mc_engine.store.derived_files import derived_files
@@ -35,6 +36,7 @@ from mc_engine.store.run_files import CAMPAIGN, JOURNAL, MANIFEST, is_run_direct
 from mc_engine.store.urls import is_url, store_url
 from mc_engine.store.writer_lock import LOCK_FILES, WriterLock
 
+AT_ONCE = 8  # files that are sent or read at a time: a store answers many requests in the time of one
 PATIENCE = 10.0  # the wait after a copy, in multiples of the time that the copy took
 
 
@@ -67,25 +69,32 @@ def publish(run: Path, url: str, trusting: bool = False) -> Publication:
         before = remote.journal()
         _refuse_another_run(remote, before, journal, set(contents))
         trusted = _counted(before.entries) if before is not None and trusting else {}
-        sent, sizes = [], {}
-        for name in contents:
+
+        def send(name: str) -> tuple[int, bool]:
+            """Size of a file, and whether it was sent."""
             content = made[name] if name in made else read_file(run / name)
             if name == JOURNAL:
                 content = content[: journal.length]  # the run may have added lines since
             digest = sha256(content).hexdigest()
             if counted.get(name, digest) != digest:
                 raise StoreError(f"{run / name}: damaged; `mc-engine verify {shell_word(run)}` names all damage")
-            if not remote.holds(name, content, trusted.get(name) == digest):
+            is_there = remote.holds(name, content, trusted.get(name) == digest)
+            if not is_there:
                 remote.write(name, content)
-                sent.append(name)
-            sizes[name] = len(content)
+            return len(content), not is_there
+
+        results: dict[str, tuple[int, bool]] = {}
+        others = [name for name in contents if name not in counted and name != JOURNAL]
+        for names in ([*counted], [JOURNAL], others):  # one after the other, so that the copy is valid
+            results |= zip(names, in_threads(send, names, AT_ONCE), strict=True)
         for name in remote.sizes:
             if (is_part_file(name) or derived.are_called(name)) and name not in contents:
                 remote.remove(name)
         listed = remote.listed()
-    if lost := [name for name, size in sizes.items() if listed.get(name) != size]:
+    if lost := [name for name, (size, _) in results.items() if listed.get(name) != size]:
         raise StoreError(f"{remote.url}/{lost[0]}: was sent and is not there; publish again")
-    return Publication(remote.url, tuple(sent), sum(sizes[name] for name in sent), len(contents) - len(sent))
+    sent = {name: size for name, (size, was_sent) in results.items() if was_sent}
+    return Publication(remote.url, tuple(sent), sum(sent.values()), len(contents) - len(sent))
 
 
 def fetch(url: str, folder: Path) -> Path:
@@ -142,11 +151,14 @@ def _copy(url: str, folder: Path) -> None:
             raise UsageError(f"{url}: holds no run")
         counted = _counted(journal.entries)
         others = [name for name in remote.sizes if name not in counted and name != JOURNAL and not is_part_file(name)]
-        for name in [*counted, *others]:
+
+        def get(name: str) -> None:
             content = remote.read(name)
             if counted.get(name, "") not in ("", sha256(content).hexdigest()):
                 raise StoreError(f"{url}/{name}: damaged, its SHA-256 is not the one in the journal")
             _write_fetched(folder, name, content, url)
+
+        in_threads(get, [*counted, *others], AT_ONCE)
         _write_fetched(folder, JOURNAL, remote.read(JOURNAL)[: journal.length], url)
     for part_folder in PART_FOLDERS:
         make_folder(folder / part_folder)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mc_engine.errors import StoreError
-from mc_engine.store.object_store import Publisher, _Remote, fetch, publish
+from mc_engine.store.object_store import AT_ONCE, Publisher, _Remote, fetch, publish
 from mc_engine.store.opening import open_store
 from tests.mc_engine.command_line.cart import call
 from tests.mc_engine.store.small_run import ENVIRONMENT, created, filled
@@ -91,10 +91,32 @@ def test_a_copy_that_is_kept_up_to_date_reads_back_what_it_sends_and_no_more(run
     assert not [name for name in seen if name.startswith("cases/")]
 
 
+def test_files_are_sent_several_at_a_time_and_the_journal_between_what_it_records_and_the_rest(run, away, monkeypatch):
+    (run / "notes.txt").write_text("mine")
+    write, at_once, most, order = _Remote.write, [], [], []
+
+    def slow(remote, name, content):
+        at_once.append(name)
+        most.append(len(at_once))
+        time.sleep(0.05)
+        write(remote, name, content)
+        at_once.remove(name)
+        order.append(name)
+
+    monkeypatch.setattr(_Remote, "write", slow)
+    publication = publish(run, f"file://{away}")
+    assert 2 < max(most) <= AT_ONCE
+    place = order.index("journal.jsonl")
+    assert sorted(order[place + 1 :]) == ["notes.txt"]
+    assert {"campaign.toml", "manifest.json"} < {*order[:place]}
+    assert sorted(publication.sent) == sorted(order)
+    assert publication.sent_bytes == sum(map(len, contents(away).values()))
+
+
 KILLED = """
 import sys, time
 from mc_engine.store import object_store
-object_store._write_fetched = lambda *_: (print("copying", flush=True), time.sleep(60))
+object_store._write_fetched = lambda *_: (sys.stdout.write("copying\\n"), sys.stdout.flush(), time.sleep(60))
 object_store.fetch(sys.argv[1], object_store.Path(sys.argv[2]))
 """
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from mc_engine.flight.chunks import LARGEST_CHUNK, chunk_size
 from mc_engine.status import MOST_CASES
+from mc_engine.store.object_store import AT_ONCE
 
 ASSUMED, MEASURED = "assumed", "measured"
 
@@ -80,6 +81,7 @@ def as_shards(costs: Costs, cases: float, nodes: int) -> dict[str, float]:
 def _publishing_s(costs: Costs, cases: int, parts: int) -> float:
     """Every part is sent and read back, checked by the last copy in flight, and read back again by the command's."""
     requests = 1e-3 * _requests(costs.publish_requests, costs.publish_more_requests, cases, parts) * costs.request_ms
+    requests /= AT_ONCE
     processor = 1e-6 * cases * (costs.publish_case_us + costs.check_case_us + costs.again_case_us)
     return requests + processor + 3.0 * 1e-9 * cases * costs.case_bytes / costs.link_gb_s
 
@@ -90,11 +92,14 @@ def _requests(of_a_part: float, of_1000_cases: float, cases: float, parts: int) 
 
 
 def merging(costs: Costs, cases: float, nodes: int) -> dict[str, float]:
-    """Seconds of one machine that fetches the shards, some at a time, and then merges them, by name."""
+    """Seconds of one machine that fetches the shards, some at a time, and then merges them, by name.
+
+    Each of the processes that fetch has several requests under way.
+    """
     shard_cases = ceil(cases / nodes)
     parts = nodes * ceil(shard_cases / chunk_size(shard_cases, int(costs.node_cores)))
     requests = _requests(costs.fetch_requests, costs.fetch_more_requests, cases, parts)
-    one_by_one = 1e-3 * requests * costs.request_ms + 1e-6 * cases * costs.fetch_case_us
+    one_by_one = 1e-3 * requests * costs.request_ms / AT_ONCE + 1e-6 * cases * costs.fetch_case_us
     return {
         "fetching": max(one_by_one / costs.fetches, 1e-9 * cases * costs.case_bytes / costs.link_gb_s),
         "merging": 1e-6 * cases * costs.merge_case_us,
