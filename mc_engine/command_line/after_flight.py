@@ -19,6 +19,7 @@ from mc_engine.command_line.app import (
     object_store,
     ranges,
     refuse_unwritable_file,
+    refuse_unwritable_folder,
     run_at,
     write_reports,
 )
@@ -115,7 +116,8 @@ def status(place: RunPlace) -> None:
     if writer is not None:
         typer.echo(f"flying    by {described(writer)}")
     elif missing:
-        typer.echo(f"missing   {ranges(missing)}; `mc-engine resume {shell_word(place)}` flies them")
+        resume = f"resume RUN --publish {shell_word(place)}" if is_url(place) else f"resume {shell_word(place)}"
+        typer.echo(f"missing   {ranges(missing)}; `mc-engine {resume}` flies them")
     elif lost := store.lost_files():
         leave(DAMAGED, f"{place}/{lost[0]}: is gone; `mc-engine verify {shell_word(place)}` names all damage")
     else:
@@ -161,7 +163,10 @@ def verify(place: RunPlace) -> None:
     for item in items:
         typer.echo(f"{place}/{item.what}" + f"; {RESUME}" * (item.mended_by == RESUME), err=True)
     if problems:
-        leave(DAMAGED, f"{place}: {counted(len(problems), 'problem')}; {'; '.join(remedies(place, problems))}")
+        ways = "; ".join(remedies("RUN" if is_url(place) else place, problems))
+        if is_url(place):
+            ways = f"in RUN, the run's own directory: {ways}; then `mc-engine publish RUN {shell_word(place)}`"
+        leave(DAMAGED, f"{place}: {counted(len(problems), 'problem')}; {ways}")
     typer.echo(f"{place}: every byte is as it was written")
 
 
@@ -274,4 +279,5 @@ def fetch(
     """Copy a run from an object store to a new directory; the checksum of every part is verified."""
     from mc_engine.store.object_store import fetch
 
+    refuse_unwritable_folder(folder, option="")
     typer.echo(f"run          {fetch(url, folder)}")

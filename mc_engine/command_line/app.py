@@ -250,7 +250,14 @@ def refuse_occupied_folder(path: Path, option: str = "--out ") -> None:
             leave(USAGE, f"{option}{error}")
     if run := next((parent for parent in path.absolute().parents if os.path.isfile(parent / JOURNAL)), None):
         leave(USAGE, f"{option}{path}: lies inside the {kind_of(run)} {run.name}; choose another folder")
-    existing = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
+    refuse_unwritable_folder(path, option)
+
+
+def refuse_unwritable_folder(path: Path, option: str = "--out ") -> None:
+    """End the command if `path` is no folder that can be written to, and none can be made there."""
+    existing = next(folder for folder in (path, *path.absolute().parents) if os.path.lexists(folder))
+    if not existing.exists():
+        leave(USAGE, f"{option}{path}: {existing} is a symbolic link to {os.readlink(existing)}, which is not there")
     if not (existing.is_dir() and os.access(existing, os.W_OK)):
         leave(USAGE, f"{option}{path}: {existing} is no folder that can be written to")
 

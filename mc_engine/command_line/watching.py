@@ -21,7 +21,7 @@ from tempfile import TemporaryDirectory
 import typer
 
 from mc_engine.campaign.search import campaign_name, campaign_section, find_campaign
-from mc_engine.command_line.app import USAGE, leave, write_reports
+from mc_engine.command_line.app import USAGE, leave, refuse_unwritable_folder, write_reports
 from mc_engine.durable_file import make_folder, write_durably
 from mc_engine.interruption import advise, unsignalled_children
 from mc_engine.store.run_files import JOURNAL
@@ -88,6 +88,8 @@ def watch_campaign(reference: str, folder: Path | None, context: typer.Context) 
     file = find_campaign(reference)
     name = campaign_name(file)
     arguments = [reference, *(word for option in options.items() for word in option)]
+    if folder is not None:
+        refuse_unwritable_folder(folder)
     page = _Page(folder or Path("runs", re.sub(r"[^\w.-]+", "-", name) + "-watch"), name)
     advise(lambda: f"no longer watched; the latest results stay in {page.path}")
     typer.echo(f"page         {page.path}")

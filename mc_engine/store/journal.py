@@ -18,6 +18,7 @@ from mc_engine.durable_file import MOST_OF_JOURNAL, append_synced, read_file
 from mc_engine.errors import StoreError
 from mc_engine.shell_words import shell_word
 
+PUT_BACK = "put the original back, or fetch a copy of the run"
 _TAIL = re.compile(rb',"crc":"([0-9a-f]{8})"}')
 _TAIL_LENGTH = len(b',"crc":"00000000"}')
 _SHORTEST = len(b'{"n":1,"at":"","event":"","crc":"00000000"}')  # bytes of a line
@@ -140,8 +141,8 @@ class Journal:
 
 def damaged_line(path: Path, number: int, why: str) -> StoreError:
     """The error for a line that is not valid, with the command that repairs the run; line 1 cannot be repaired."""
-    way_out = f"; `mc-engine resume --repair {shell_word(path.parent)}` drops it and flies again what it recorded"
-    return StoreError(f"{path}, line {number}: damaged, {why}{way_out * (number > 1)}")
+    way_out = f"`mc-engine resume --repair {shell_word(path.parent)}` drops it and flies again what it recorded"
+    return StoreError(f"{path}, line {number}: damaged, {why}; {way_out if number > 1 else PUT_BACK}")
 
 
 def utc_now() -> str:

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from mc_engine.durable_file import disk_errors, is_temporary, make_folder, read_file, sync_folder, write_durably
-from mc_engine.errors import EngineError, StoreError, UsageError
+from mc_engine.errors import DiskError, EngineError, StoreError, UsageError
 from mc_engine.extras import how_to_install
 from mc_engine.interruption import in_threads
 from mc_engine.shell_words import shell_word
@@ -32,10 +32,11 @@ from mc_engine.store.derived_files import derived_files
 from mc_engine.store.journal import Entry, Scan, read_journal, scan
 from mc_engine.store.parts import PART_FOLDERS, is_part_file
 from mc_engine.store.receipts import receipts_of
-from mc_engine.store.run_files import CAMPAIGN, JOURNAL, MANIFEST, is_run_directory
+from mc_engine.store.run_files import CAMPAIGN, JOURNAL, MANIFEST, SENSITIVITY, is_run_directory
 from mc_engine.store.urls import is_url, store_url
 from mc_engine.store.writer_lock import LOCK_FILES, WriterLock
 
+_INNER = f"{SENSITIVITY}/{JOURNAL}"  # of the flights for sensitivities, a run directory inside the run
 AT_ONCE = 8  # files that are sent or read at a time: a store answers many requests in the time of one
 PATIENCE = 10.0  # the wait after a copy, in multiples of the time that the copy took
 
@@ -59,25 +60,30 @@ def publish(run: Path, url: str, trusting: bool = False) -> Publication:
     """
     if not is_run_directory(run):
         raise UsageError(f"{run}: is no run directory")
-    journal = _sound(scan(read_journal(run / JOURNAL)), run / JOURNAL)
-    counted = _counted(journal.entries)
-    derived = derived_files(run)
-    made = derived.read_with_journal()
+    derived, verify = derived_files(run), f"`mc-engine verify {shell_word(run)}` names all damage"
+    with _naming(verify):
+        journal = _sound(scan(read_journal(run / JOURNAL)), run / JOURNAL)
+        counted, made = _counted(journal.entries), derived.read_with_journal()
+        if (run / _INNER).exists() and not (run / SENSITIVITY).is_symlink():
+            inner = _sound(scan(content := read_journal(run / _INNER)), run / _INNER)
+            counted |= _counted_inside(inner)
+            made[_INNER] = content[: inner.length]
     contents = {**counted, JOURNAL: None, **dict.fromkeys(_others(run, counted, derived)), **made}
     with _reaching(url):
         remote = _Remote(url)
         before = remote.journal()
-        _refuse_another_run(remote, before, journal, set(contents))
+        _refuse_another_run(run, remote, before, journal, set(contents))
         trusted = _counted(before.entries) if before is not None and trusting else {}
 
         def send(name: str) -> tuple[int, bool]:
             """Size of a file, and whether it was sent."""
-            content = made[name] if name in made else read_file(run / name)
-            if name == JOURNAL:
-                content = content[: journal.length]  # the run may have added lines since
-            digest = sha256(content).hexdigest()
-            if counted.get(name, digest) != digest:
-                raise StoreError(f"{run / name}: damaged; `mc-engine verify {shell_word(run)}` names all damage")
+            with _naming(verify):
+                content = made[name] if name in made else read_file(run / name)
+                if name == JOURNAL:
+                    content = content[: journal.length]  # the run may have added lines since
+                digest = sha256(content).hexdigest()
+                if counted.get(name, digest) != digest:
+                    raise StoreError(f"{run / name}: damaged, its SHA-256 is not the one in the journal")
             is_there = remote.holds(name, content, trusted.get(name) == digest)
             if not is_there:
                 remote.write(name, content)
@@ -144,24 +150,34 @@ def _locked(folder: Path) -> Iterator[None]:
 
 
 def _copy(url: str, folder: Path) -> None:
+    """Copy the files of the run at a URL, its journal last; StoreError for a damaged one."""
     with _reaching(url):
         remote = _Remote(url)
-        journal = remote.journal()
-        if journal is None:
-            raise UsageError(f"{url}: holds no run")
-        counted = _counted(journal.entries)
+        again = f"`mc-engine publish RUN {shell_word(remote.url)}` sends it again from the run's own directory"
+        with _naming(again):
+            journal = remote.journal()
+            if journal is None:
+                send = f"`mc-engine publish RUN {shell_word(remote.url)}` sends one"
+                raise UsageError(f"{remote.url}: holds no run; {send}")
+            counted = _counted(_sound(journal, f"{remote.url}/{JOURNAL}").entries)
+            if _INNER in remote.sizes:
+                counted |= _counted_inside(_sound(scan(remote.read(_INNER)), f"{remote.url}/{_INNER}"))
         others = [name for name in remote.sizes if name not in counted and name != JOURNAL and not is_part_file(name)]
 
         def get(name: str) -> None:
-            content = remote.read(name)
-            if counted.get(name, "") not in ("", sha256(content).hexdigest()):
-                raise StoreError(f"{url}/{name}: damaged, its SHA-256 is not the one in the journal")
+            with _naming(again):
+                if name not in remote.sizes:
+                    raise StoreError(f"{remote.url}/{name}: is not there")
+                content = remote.read(name)
+                if counted.get(name, "") not in ("", sha256(content).hexdigest()):
+                    raise StoreError(f"{remote.url}/{name}: damaged, its SHA-256 is not the one in the journal")
             _write_fetched(folder, name, content, url)
 
         in_threads(get, [*counted, *others], AT_ONCE)
         _write_fetched(folder, JOURNAL, remote.read(JOURNAL)[: journal.length], url)
-    for part_folder in PART_FOLDERS:
-        make_folder(folder / part_folder)
+    for run in (folder, folder / SENSITIVITY):
+        for part_folder in PART_FOLDERS if (run / JOURNAL).exists() else ():
+            make_folder(run / part_folder)  # an object store has no empty folders
 
 
 def local_copy(place: str | Path) -> Path:
@@ -186,6 +202,11 @@ def _counted(entries: tuple[Entry, ...]) -> dict[str, str]:
     return {**{part.file: part.sha256 for part in receipts_of(entries)[0].all_parts()}, **heads}
 
 
+def _counted_inside(journal: Scan) -> dict[str, str]:
+    """The same of the flights for sensitivities, by their own journal."""
+    return {f"{SENSITIVITY}/{name}": digest for name, digest in _counted(journal.entries).items()}
+
+
 def _others(run: Path, counted: Mapping[str, str], derived: CountedFiles) -> list[str]:
     """Names of the other files in the run directory: no parts, reports, replays, locks or temporary files."""
     paths = [path for path in sorted(run.rglob("*")) if path.is_file() and not path.is_symlink()]
@@ -204,15 +225,19 @@ def _sound(journal: Scan, place: Path | str) -> Scan:
     return journal
 
 
-def _refuse_another_run(remote: "_Remote", before: Scan | None, journal: Scan, ours: set[str]) -> None:
+def _refuse_another_run(run: Path, remote: "_Remote", before: Scan | None, journal: Scan, ours: set[str]) -> None:
     if before is not None:
+        if not before.entries or before.entries[0].number > 1:
+            lost = f"{remote.url}/{JOURNAL}, line 1: damaged, and it alone says whose copy this is"
+            raise StoreError(f"{lost}; if it is one of {run}, remove that file and publish again")
         theirs = before.entries[0]
         if (theirs.at, theirs.facts) != (journal.entries[0].at, journal.entries[0].facts):
             raise UsageError(f"{remote.url}: holds another run; choose another place")
         if before.length > journal.length:
             raise UsageError(f"{remote.url}: holds a later state of this run; fetch that one")
     elif foreign := sorted(set(remote.sizes) - ours):
-        raise UsageError(f"{remote.url}: holds {foreign[0]} and no run; choose another place")
+        held = f"holds {foreign[0]} and no run" if foreign[0] else "is a file"
+        raise UsageError(f"{remote.url}: {held}; choose another place")
 
 
 def _write_fetched(folder: Path, name: str, content: bytes, url: str) -> None:
@@ -221,6 +246,17 @@ def _write_fetched(folder: Path, name: str, content: bytes, url: str) -> None:
         raise StoreError(f"{url}: {json.dumps(name)} lies outside the run")
     make_folder(path.parent)
     write_durably(path, content)
+
+
+@contextmanager
+def _naming(next_step: str) -> Iterator[None]:
+    """Add the next step to the message for a file that is missing or damaged."""
+    try:
+        yield
+    except (DiskError, UsageError):
+        raise
+    except StoreError as error:
+        raise StoreError(f"{error}; {next_step}") from error
 
 
 class _Remote:
@@ -241,13 +277,13 @@ class _Remote:
         return {path[len(self._root) :].lstrip("/"): int(facts["size"]) for path, facts in listed.items()}
 
     def journal(self) -> Scan | None:
-        """The journal at the URL, or None."""
+        """The journal at the URL, with lines that may be damaged; None if there is none."""
         if JOURNAL not in self.sizes:
             return None
         journal = scan(self.read(JOURNAL))
         if not journal.entries and not journal.damaged:  # sending was interrupted within the first line
             return None
-        return _sound(journal, f"{self.url}/{JOURNAL}")
+        return journal
 
     def read(self, name: str) -> bytes:
         return bytes(self._files.cat_file(f"{self._root}/{name}"))

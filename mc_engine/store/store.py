@@ -8,6 +8,7 @@ whose rows are correct.)  Manifest and campaign file never change; later events 
 one thread, and one process at a time may write.
 """
 
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
@@ -24,7 +25,7 @@ from mc_engine.shell_words import shell_word
 from mc_engine.store import parts
 from mc_engine.store.finished_parts import count_finished, leave_receipts
 from mc_engine.store.histories import history_columns, history_table, read_histories
-from mc_engine.store.journal import Entry, Journal, damaged_line, encode, utc_now
+from mc_engine.store.journal import PUT_BACK, Entry, Journal, damaged_line, encode, utc_now
 from mc_engine.store.manifest_file import cases_in, columns_in, edited_files, manifest_bytes, parse_manifest
 from mc_engine.store.parts import CASE_COLUMNS, PART_FOLDERS, Column, Part, Written, is_part_file
 from mc_engine.store.receipts import Range, Receipts, receipts_of
@@ -34,7 +35,6 @@ from mc_engine.store.writer_lock import LOCK_FILES, LOCK_NAME, WriterLock, write
 if TYPE_CHECKING:
     import pandas as pd
 
-_EDITED = "damaged or edited, it is not the one this run began with; put the original back"
 _OURS_BEFORE_THE_JOURNAL = {*LOCK_FILES, CAMPAIGN, MANIFEST, *PART_FOLDERS}
 
 
@@ -121,9 +121,12 @@ class Store:
         return f"Store({str(self.path)!r})"
 
     def _original(self, name: str, fact: str) -> bytes:
+        if not os.path.lexists(self.path / name):
+            raise StoreError(f"{self.path / name}: is gone; {PUT_BACK}")
         content = disk.read_short(self.path / name)
         if sha256(content).hexdigest() != self._created[fact]:
-            raise StoreError(f"{self.path / name}: {_EDITED}")
+            why = "damaged or edited, it is not the one this run began with"
+            raise StoreError(f"{self.path / name}: {why}; {PUT_BACK}")
         return content
 
     def _read_journal(self) -> None:
@@ -131,7 +134,7 @@ class Store:
             raise StoreError(f"{self.path}: has no {JOURNAL}, and so no committed case; `run` the campaign anew")
         self._journal = Journal(self.path / JOURNAL)
         if not self._journal.entries or self._journal.entries[0].event != "created":
-            raise StoreError(f'{self.path / JOURNAL}, line 1: damaged, it is not the event "created"')
+            raise damaged_line(self.path / JOURNAL, 1, 'it is not the event "created"')
         self._counted, wrong = receipts_of(self._journal.entries, self._counted.begun_with)
         for number, why in wrong.items():
             raise damaged_line(self.path / JOURNAL, number, why)
@@ -153,7 +156,7 @@ class Store:
     def check_companions(self) -> None:
         """StoreError if a copy of a file that the campaign reads has changed since the run began."""
         for problem in edited_files(self.path, self._created.get("companions", {})):
-            raise StoreError(f"{self.path}/{problem}; put the original back")
+            raise StoreError(f"{self.path}/{problem}; {PUT_BACK}")
 
     # ---- the state of the run, from the journal
 

@@ -164,18 +164,56 @@ def test_another_run_or_other_files_or_a_later_state_are_not_overwritten(memory,
         publish(run, "memory://elsewhere")
 
 
-def test_damage_is_neither_sent_nor_fetched(memory, run, tmp_path):
+@pytest.mark.parametrize("lost", [False, True], ids=["damaged", "lost"])
+@pytest.mark.parametrize("inside", ["", "sensitivity/"])
+def test_damage_is_neither_sent_nor_fetched_and_the_message_says_what_to_do(memory, run, tmp_path, lost, inside):
+    filled(created(run / "sensitivity"))
     publish(run, memory)
     files = fsspec.filesystem("memory")
-    part = open_store(run).parts[1].file
+    part = inside + open_store(run).parts[1].file
     content = bytearray(files.cat_file(f"runs/{part}"))
     content[100] ^= 1
-    files.pipe_file(f"runs/{part}", bytes(content))
-    with pytest.raises(StoreError, match=f"{part}: damaged"):
+    if lost:
+        files.rm_file(f"runs/{part}")
+        (run / part).rename(tmp_path / "part")
+    else:
+        files.pipe_file(f"runs/{part}", bytes(content))
+        (run / part).rename(tmp_path / "part")
+        (run / part).write_bytes(bytes(content))
+    with pytest.raises(StoreError, match=f"^{memory}/{part}: .*; `mc-engine publish RUN {memory}` sends it again"):
         fetch(memory, tmp_path / "back")
-    (run / part).write_bytes(bytes(content))
-    with pytest.raises(StoreError, match="verify"):
+    with pytest.raises(StoreError, match=f"^{run}/{part}: .*; `mc-engine verify {run}` names all damage$"):
         publish(run, "memory://fresh")
+    (tmp_path / "part").replace(run / part)
+    assert publish(run, memory).sent == (part,)
+    assert damage(fetch(memory, tmp_path / "back")) == []
+
+
+def test_a_damaged_journal_at_a_url_is_sent_again_if_its_first_line_says_whose_it_is(memory, run, tmp_path):
+    publish(run, memory)
+    files = fsspec.filesystem("memory")
+    lines = files.cat_file("runs/journal.jsonl").splitlines(keepends=True)
+    files.pipe_file("runs/journal.jsonl", b"".join([*lines[:2], b"x" + lines[2][1:], *lines[3:]]))
+    with pytest.raises(StoreError, match=f"line 3: damaged; `mc-engine publish RUN {memory}` sends it again"):
+        open_store(memory)
+    assert publish(run, memory).sent == ("journal.jsonl",)
+    assert len(open_store(memory).cases()) == 40
+    files.pipe_file("runs/journal.jsonl", b"".join([b"x" + lines[0][1:], *lines[1:]]))
+    with pytest.raises(StoreError, match=r"line 1: damaged, .*remove that file and publish again"):
+        publish(run, memory)
+
+
+def test_no_command_that_is_printed_for_a_url_is_one_that_refuses_urls(memory, tmp_path):
+    store = created(tmp_path / "begun")
+    store.append(0, 10, block(0, 10))
+    publish(tmp_path / "begun", memory)
+    assert f"10 to 39; `mc-engine resume RUN --publish {memory}` flies them" in run_verb("status", memory)
+    filled(created(tmp_path / "whole")).note("started")  # and no line "finished"
+    publish(tmp_path / "whole", "memory://whole")
+    answer = CliRunner().invoke(app, ["verify", "memory://whole"])
+    assert answer.exit_code == 5
+    assert "in RUN, the run's own directory: `mc-engine resume RUN --repair` flies" in answer.stderr
+    assert answer.stderr.endswith("; then `mc-engine publish RUN memory://whole`\n")
 
 
 def test_names_from_a_store_stay_inside_the_folder(memory, run, tmp_path):

@@ -202,6 +202,12 @@ def test_an_occupied_folder_is_refused_before_flying(here, calls):
     merged = call("merge", "flown", "flown")  # the folder is an argument there, and no option
     fails_with(2, merged, "flown: holds a run already")
     assert "--out" not in merged.stderr
+    (here / "link").symlink_to("nowhere")
+    url = f"file://{here}/copy"
+    for words in (["run", "cart", "--out"], ["run", "cart", "--watch", "--out"], ["merge"], ["fetch", url]):
+        for place in ("link", "link/in"):
+            last = ["flown"] if words == ["merge"] else []
+            fails_with(2, call(*words, place, *last), f"{place}: ", "is a symbolic link to nowhere, which is not there")
     (here / "flown" / "in").mkdir()
     (here / "flown" / "in" / ".lock").touch()  # as a creation that was cut short leaves it
     fails_with(2, call("run", "cart", "--out", "flown/in"), "--out flown/in: lies inside the run flown")
