@@ -1,7 +1,7 @@
 """The commands that fly cases: run, resume, extend, rerun, merge."""
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -35,6 +35,7 @@ from mc_engine.command_line.app import (
     write_reports,
 )
 from mc_engine.command_line.next_step import MERGE, after_flight, is_complete
+from mc_engine.errors import RunInterrupted
 from mc_engine.interruption import NOTHING_BEGUN, advise, raise_if_signalled
 from mc_engine.shell_words import shell_word
 from mc_engine.status import MOST_CASES
@@ -170,13 +171,17 @@ def _refuse_publication(url: str | None) -> None:
         refuse_unreachable(url)
 
 
-def _publisher(path: Path, url: str | None) -> AbstractContextManager[Any]:
+@contextmanager
+def _publisher(path: Path, url: str | None) -> Iterator[None]:
     """Keeps a copy of the run in `path` at `url` up to date, if a URL is given."""
-    if url is None:
-        return nullcontext()
     from mc_engine.store.object_store import Publisher
 
-    return Publisher(path, url)
+    try:
+        with nullcontext() if url is None else Publisher(path, url):
+            yield
+    except RunInterrupted as error:
+        copy = f"; with --publish {shell_word(url)} it keeps the copy there up to date" if url else ""
+        raise RunInterrupted(f"{error}{copy}") from error
 
 
 def _with_progress(

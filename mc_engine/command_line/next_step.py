@@ -26,9 +26,8 @@ def after_flight(run: Path, options: str = "", url: str | None = None, rerun: bo
     # a run with interim analyses is complete once it is decided, which `resume` finds out
     if manifest.get("looks") or not _is_finished(events):
         command = "rerun --failed" if rerun and "rerun" in events else "resume"
-        return (
-            f"interrupted; what was committed is safe, `mc-engine {command} {shell_word(run)}{options}` flies the rest"
-        )
+        again = f"`mc-engine {command} {shell_word(run)}{options}{f' --publish {shell_word(url)}' if url else ''}`"
+        return f"interrupted; what was committed is safe, {again} flies the rest"
     if manifest.get("shard"):
         return f"interrupted; all cases of the shard are in {run}, `mc-engine merge RUN SHARD...` joins the shards"
     copy = f", `mc-engine publish {shell_word(run)} {shell_word(url)}` sends them and the cases" if url else ""

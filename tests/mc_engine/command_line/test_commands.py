@@ -8,6 +8,7 @@ import pytest
 from cart import CAMPAIGN, MODEL, call, fails_with, small_store
 
 import mc_engine.runner
+from mc_engine.command_line.next_step import after_flight
 from mc_engine.errors import ModelError, RunInterrupted, StoreError
 from mc_engine.store.opening import open_store
 from mc_engine.store.verification import damage
@@ -187,6 +188,16 @@ def test_what_goes_wrong_in_flight_sets_the_exit_status(here, calls):
     ]:
         calls.fail = error
         fails_with(status, call("run", "cart", "--out", "a"), str(error))
+
+
+def test_the_command_that_continues_a_published_run_keeps_its_copy_up_to_date(here, calls):
+    pytest.importorskip("fsspec")
+    url, calls.fail = f"file://{here}/copy", RunInterrupted("interrupted; `mc-engine resume a` flies the rest")
+    fails_with(4, call("run", "cart", "--out", "a", "--publish", url), f"flies the rest; with --publish {url} it keeps")
+    small_store(here / "b", fly=False)
+    assert f"`mc-engine resume {here / 'b'} --workers 2 --publish {url}`" in after_flight(
+        here / "b", " --workers 2", url
+    )
 
 
 def test_a_fault_of_the_engine_itself_is_told_apart_from_all_else(here, calls):
