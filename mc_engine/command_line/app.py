@@ -268,6 +268,8 @@ def refuse_unwritable_file(option: str, path: Path) -> None:
         leave(USAGE, f"{option} {path}: there is no folder {path.parent}")
     if path.is_dir():
         leave(USAGE, f"{option} {path}: is a folder; name a file")
+    if not os.access(path.parent, os.W_OK):
+        leave(USAGE, f"{option} {path}: this user may not write to the folder {path.parent}; name a file elsewhere")
 
 
 def ranges(ranges: list[tuple[int, int]]) -> str:

@@ -16,6 +16,7 @@ from mc_engine.command_line.app import (
     ranges,
     replay_picture,
 )
+from mc_engine.errors import StoreError
 from mc_engine.suggestions import hint, listed
 
 if TYPE_CHECKING:
@@ -136,7 +137,13 @@ def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE"
         within = f"within the tolerance of its simulator, {flight.tolerance:g} of the number"
         typer.echo(f"case {case}: every stored number is {within}; bits were not compared")
     if store.manifest.get("quantities"):  # a simulator without outputs has no history
-        for path in write_replay(store, case, flight.history, replay_picture(store, case, flight.history)):
-            typer.echo(str(path))
+        try:
+            for path in write_replay(store, case, flight.history, replay_picture(store, case, flight.history)):
+                typer.echo(str(path))
+        except StoreError as error:
+            why = f"case {case} was compared; its history and picture were not written: {error}"
+            if flight.equal:
+                raise type(error)(why) from error
+            typer.echo(why, err=True)
     if not flight.equal:
         leave(DAMAGED, f"case {case} is not the one in {folder}: the run was changed, or flown by other sources")

@@ -1,4 +1,6 @@
 import csv
+import errno
+import os
 import sys
 from types import ModuleType, SimpleNamespace
 
@@ -8,6 +10,7 @@ import pytest
 from cart import CAMPAIGN, MODEL, call, fails_with, small_store
 
 import mc_engine.runner
+from mc_engine import durable_file
 from mc_engine.command_line.next_step import after_flight
 from mc_engine.errors import ModelError, RunInterrupted, StoreError
 from mc_engine.store.opening import open_store
@@ -264,7 +267,24 @@ def test_replay_tells_its_comparison_also_where_the_history_cannot_be_written(he
     (here / "flown" / "replay").write_text("")
     result = call("replay", "flown", 17)
     assert "case 17: every stored number has the same bits" in result.stdout
-    fails_with(5, result, "flown/replay: is no folder")
+    fails_with(5, result, "case 17 was compared; its history and picture were not written: flown/replay: is no folder")
+
+
+def test_where_nothing_can_be_written_a_difference_is_told_and_a_file_is_refused_before_the_work(
+    here, calls, monkeypatch
+):
+    small_store(here / "flown")
+    calls.equal = False
+    with monkeypatch.context() as patch:
+        patch.setattr(durable_file.os, "mkdir", lambda *_, **__: _no_permission())
+        fails_with(5, call("replay", "flown", 17), "were not written: flown/replay", "case 17 is not the one in flown")
+    monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
+    for words in (["export", "flown"], ["sample", "cart"]):
+        fails_with(2, call(*words, "--out", "a.csv"), "--out a.csv: this user may not write to the folder .")
+
+
+def _no_permission():
+    raise PermissionError(errno.EACCES, "Permission denied")
 
 
 def test_replay_of_a_case_with_other_bits_names_them_and_exits_with_5(here, calls):
