@@ -11,7 +11,7 @@ from mc_engine.campaign.loading import Campaign
 from mc_engine.flight import flight
 from mc_engine.flight.contract import breaches, flight_faults, refuse_breaches
 from mc_engine.flight.flyer import Columns, Flyer, Inputs, Process, never
-from mc_engine.flight.kernel import finer, source_digest, usual_width
+from mc_engine.flight.kernel import finer, make_kernel_folder, source_digest, usual_width
 from mc_engine.flight.lost_numbers import first_lost, may_be_lost
 from mc_engine.model.fields import AdaptiveStep
 from mc_engine.model.record import compiled_model
@@ -65,6 +65,7 @@ class CompiledFlyer(Flyer):
 
     def refuse_faults(self) -> None:
         refuse_breaches(self._campaign)
+        make_kernel_folder()
 
     def fly_finer(self, inputs: Inputs, noise: np.ndarray) -> tuple[str, Columns]:
         """(what is finer, results of the cases) with half of the steps, or a tenth of the tolerances."""

@@ -197,18 +197,24 @@ def _template(model: Model) -> str:
 
 
 def _write_source(path: Path, text: bytes) -> None:
-    """Write the source of a kernel, unless it is there; DiskError with the folder's variable where no folder can be.
+    """Write the source of a kernel, unless it is there.
 
     It is for people, and for messages of the compiler: what runs is `text`, also where the disk refuses the file.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DiskError(f"{path.parent}: {error.strerror or error}; compiled kernels are kept there, name another "
-                        "folder in MC_ENGINE_CACHE") from error  # fmt: skip
+    make_kernel_folder(path.parent)
     with suppress(OSError):
         if not path.exists() or path.read_bytes() != text:
             replace_file(path, text)
+
+
+def make_kernel_folder(path: Path | None = None) -> None:
+    """Make the folder of a kernel, by default that of all kernels; DiskError with its variable where none can be."""
+    path = path or cache_folder() / "kernels"
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DiskError(f"{path}: {error.strerror or error}; compiled kernels are kept there, name another folder in "
+                        "MC_ENGINE_CACHE") from error  # fmt: skip
 
 
 # ---- what a kernel takes beside the cases

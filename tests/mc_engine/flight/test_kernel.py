@@ -235,12 +235,15 @@ def test_a_full_disk_of_the_cache_is_told_and_the_cases_fly(tmp_path, monkeypatc
     assert "No space left on device; compiled kernels cannot be kept there" in told
 
 
-def test_a_cache_that_cannot_be_is_named_with_its_variable(tmp_path, monkeypatch):
+def test_a_cache_that_cannot_be_is_named_with_its_variable_before_a_run_is_begun(tmp_path, monkeypatch):
     (tmp_path / "model.py").write_text(fall(5.0))
     (tmp_path / "cache").touch()
     monkeypatch.setenv("MC_ENGINE_CACHE", str(tmp_path / "cache"))
-    with pytest.raises(DiskError, match=r"cache.*: Not a directory; .* name another folder in MC_ENGINE_CACHE"):
-        speed(tmp_path, "model.py")
+    campaign = mc_engine.load_campaign("minimal")
+    for flight in (lambda: speed(tmp_path, "model.py"), lambda: mc_engine.run(campaign, tmp_path / "run")):
+        with pytest.raises(DiskError, match=r"cache.*: Not a directory; .* name another folder in MC_ENGINE_CACHE"):
+            flight()
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.slow  # copies of a campaign and other processes are in test_kernel_key.py and above
