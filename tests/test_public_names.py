@@ -78,3 +78,35 @@ def _arguments(value):
 def _is_explained(argument, text):
     """A line "argument : ...", or "argument(p, o) : ..." of a function, or "first, argument : ..."."""
     return re.search(rf"^(\w+, )*{argument}(\(.*\))?(, \w+)* : \S", text, re.MULTILINE) is not None
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda e, run: e.open_run(e.open_store(run)), "opened by its path or URL, and Store is neither; its path is "),
+        (lambda e, run: e.open_store(None), "opened by its path or URL, and NoneType is neither$"),
+        (lambda e, run: e.resume(e.open_run(run)), "and Run is neither; its path is "),
+        (lambda e, run: e.run("minimal"), "campaign: 'minimal' is no Campaign; load_campaign makes one"),
+        (lambda e, run: e.tune("minimal"), "campaign: 'minimal' is no Campaign"),
+        (lambda e, run: e.case_table("minimal", [0]), "campaign: 'minimal' is no Campaign"),
+        (lambda e, run: e.case_table(e.load_campaign("minimal"), [0.5]), "a whole number from 0 to 1999, and 0.5 is"),
+        (lambda e, run: e.replay(run, 3.5), "a whole number from 0 to 7, and 3.5 is none"),
+        (lambda e, run: e.run(e.load_campaign("minimal"), shard="1/2"), r"'1/2' is no Shard; Shard.parse\(\"1/2\"\)"),
+        (lambda e, run: e.run(e.load_campaign("minimal"), backend=None), "backend: None is not allowed; it is a Back"),
+        (lambda e, run: e.extend(run, 2e3), r"cases: 2000\.0 is not allowed; it must be a whole number from 1 on"),
+    ],
+)
+def test_an_argument_of_another_type_is_rejected_in_one_sentence_and_nothing_is_written(runs, monkeypatch, wrong, said):
+    monkeypatch.chdir(runs)
+    before = {path: path.stat().st_mtime_ns for path in runs.rglob("*")}
+    with pytest.raises(mc_engine.EngineError, match=said):
+        wrong(mc_engine, "runs/small")
+    assert {path: path.stat().st_mtime_ns for path in runs.rglob("*")} == before
+
+
+def test_paths_and_numbers_may_be_those_of_text_and_numpy(runs, monkeypatch):
+    monkeypatch.chdir(runs)
+    assert mc_engine.load_campaign("minimal", cases=np.int64(5), seed=np.int64(6)).seed == 6
+    assert mc_engine.Store("runs/small").n_cases >= 8
+    with pytest.raises(mc_engine.CampaignError, match=r"--from needs a section \[inputs\]"):
+        mc_engine.load_campaign("minimal", upstream="runs/small")

@@ -7,7 +7,7 @@ import numpy as np
 
 from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.campaign.inputs import number
-from mc_engine.campaign.loading import Campaign
+from mc_engine.campaign.loading import Campaign, refuse_no_campaign
 from mc_engine.campaign.parts import rank_pairs
 from mc_engine.campaign.sensitivity_design import DESIGN as PICK_FREEZE
 from mc_engine.campaign.sensitivity_design import companion_table, names_a_draw, upstream_ids
@@ -56,7 +56,12 @@ def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray
 
 
 def _checked_ids(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
-    ids = np.asarray(case_ids, dtype=np.int64).reshape(-1)
+    refuse_no_campaign(campaign)
+    given = np.asarray(case_ids).reshape(-1)
+    if given.size and given.dtype.kind not in "iu":
+        message = f"a case is a whole number from 0 to {campaign.cases - 1}, and {given.tolist()[0]!r} is none"
+        raise CampaignError(campaign.name, [Problem("", message)])
+    ids = given.astype(np.int64)
     if campaign.first is not None:
         message = f'has yet to be flown; `mc-engine run` flies "{campaign.first.name}" before this campaign'
         raise CampaignError(campaign.name, [Problem("inputs.from", message)])

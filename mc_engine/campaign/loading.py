@@ -35,7 +35,7 @@ from mc_engine.campaign.search import campaign_name, campaign_text, find_campaig
 from mc_engine.campaign.sections import CampaignSection, HistoriesSection
 from mc_engine.campaign.sensitivity_design import SensitivityDesign, check_sensitivity
 from mc_engine.campaign.tuning_section import Tuning, check_tuning
-from mc_engine.errors import CampaignError, ModelError
+from mc_engine.errors import CampaignError, EngineError, ModelError
 from mc_engine.model.fields import inputs_of
 from mc_engine.model.simulator import System
 from mc_engine.sampling.designs import BY_LEVELS, DESIGNS, IN_BLOCKS, RANDOM, level_count
@@ -123,7 +123,7 @@ def load_campaign(
     seed: int | None = None,
     text: str | None = None,
     directory: Path | None = None,
-    upstream: Path | None = None,
+    upstream: str | Path | None = None,
 ) -> Campaign:
     """Read a campaign file and check it against its model.
 
@@ -133,7 +133,7 @@ def load_campaign(
     seed : int, seed in place of the file's
     text : str, the contents of the file, where they do not come from a file
     directory : Path, the folder in which `text` looks for its tables; the working folder by default
-    upstream : Path, the run to take inputs from, in place of the one that [inputs] names
+    upstream : str or Path, the run to take inputs from, in place of the one that [inputs] names
 
     Returns the Campaign.
 
@@ -151,12 +151,20 @@ def load_campaign(
         name, source, directory = str(reference), Path(str(reference)).name, Path(directory or Path.cwd())
     document = parse_toml(text, source)
     written = _campaign_keys(document)
-    written.update({key: value for key, value in (("cases", cases), ("seed", seed)) if value is not None})
-    findings = Findings()
-    campaign = _assemble(name, text, directory, document, cases is not None, upstream, findings)
+    given = {key: value for key, value in (("cases", cases), ("seed", seed)) if value is not None}
+    written.update({key: int(value) if isinstance(value, np.integer) else value for key, value in given.items()})
+    findings, run = Findings(), None if upstream is None else Path(upstream)
+    campaign = _assemble(name, text, directory, document, cases is not None, run, findings)
     if campaign is None or findings.problems:
         raise CampaignError(source, findings.problems)
     return campaign
+
+
+def refuse_no_campaign(campaign: object) -> None:
+    """EngineError where a function is given anything but a Campaign, such as the name of one."""
+    if not isinstance(campaign, Campaign):
+        what = repr(campaign) if isinstance(campaign, str | Path) else type(campaign).__name__
+        raise EngineError(f"campaign: {what} is no Campaign; load_campaign makes one of a name or a file")
 
 
 def _assemble(

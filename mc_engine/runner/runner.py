@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mc_engine.campaign.cases import case_table
-from mc_engine.campaign.loading import Campaign, load_campaign
+from mc_engine.campaign.loading import Campaign, load_campaign, refuse_no_campaign
 from mc_engine.campaign.sections import HistoriesSection
-from mc_engine.errors import CampaignError, Problem, StoreError
+from mc_engine.errors import CampaignError, EngineError, Problem, StoreError
 from mc_engine.flight.chunks import name_upstream
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import in_threads
@@ -24,7 +24,7 @@ from mc_engine.runner.flown_campaign import campaign_of, companions_of, refuse_u
 from mc_engine.runner.histories import history_frame, inputs_of
 from mc_engine.runner.manifest import columns_of, manifest_of
 from mc_engine.runner.progress import ProgressCall
-from mc_engine.runner.sessions import Session, complete, fly_failed, session_of
+from mc_engine.runner.sessions import Session, complete, fly_failed, refuse_no_count, session_of
 from mc_engine.runner.shards import Shard, merge_shards
 from mc_engine.sampling.designs import block_problem, extension_problem
 from mc_engine.store.opening import open_store
@@ -97,6 +97,9 @@ def run(
     """
     if out is not None and is_url(out):
         raise StoreError(f"{out}: is a URL; fly into a folder, and give that and the URL to object_store.publish")
+    refuse_no_campaign(campaign)
+    if shard is not None and not isinstance(shard, Shard):
+        raise EngineError(f'shard: {shard!r} is no Shard; Shard.parse("1/2") of mc_engine.runner.shards makes one')
     path = Path(out) if out is not None else default_folder(campaign.name)
     session = session_of(progress, workers, chunk, backend)
     flyer_on(session.backend.name, campaign).refuse_faults()
@@ -197,6 +200,7 @@ def extend(
     >>> extend("runs/small", 12).n_cases
     12
     """
+    refuse_no_count("cases", cases)
     store = open_store(path)
     if sentence := extension_problem(store.manifest, store.n_cases, cases):
         raise StoreError(f"{path}: {sentence}")

@@ -55,12 +55,20 @@ def session_of(
 ) -> Session:
     """A session from the arguments of the runner's functions; EngineError for one that nothing can be flown with."""
     for name, number in (("workers", workers), ("chunk", chunk)):
-        if number is not None and not (isinstance(number, Integral) and number >= 1):
-            raise EngineError(f"{name}: {number!r} is not allowed; it must be a whole number from 1 on, or None")
+        if number is not None:
+            refuse_no_count(name, number)
     if progress is not None and not callable(progress):
         raise EngineError(f"progress: {progress!r} is no function of (cases done, cases wanted, cases failed)")
     backend = Backend(backend) if isinstance(backend, str) else backend
+    if not isinstance(backend, Backend):
+        raise EngineError(f'backend: {backend!r} is not allowed; it is a Backend or the name of one, as "threading"')
     return Session(progress, workers or os.cpu_count() or 1, chunk, backend)
+
+
+def refuse_no_count(name: str, number: object) -> None:
+    """EngineError unless the argument of this name is a whole number from 1 on."""
+    if not (isinstance(number, Integral) and int(number) >= 1):
+        raise EngineError(f"{name}: {number!r} is not allowed; it must be a whole number from 1 on")
 
 
 def complete(store: Store, campaign: Campaign, session: Session, repair: bool = False) -> Store:

@@ -182,6 +182,9 @@ def _copy(url: str, folder: Path) -> None:
 
 def local_copy(place: str | Path) -> Path:
     """The directory `place`; for a URL, a copy that is removed when this process ends."""
+    if not isinstance(place, str | os.PathLike):
+        beside = f"; its path is {place.path}" if isinstance(getattr(place, "path", None), Path) else ""
+        raise UsageError(f"a run is opened by its path or URL, and {type(place).__name__} is neither{beside}")
     if not is_url(place):
         return Path(place)
     scratch = Path(tempfile.mkdtemp(prefix="mc-engine-"))

@@ -103,8 +103,8 @@ class Store:
     {'case_id': '', 'apogee_altitude_km': 'km'}
     """
 
-    def __init__(self, path: Path):
-        self.path = path
+    def __init__(self, path: str | Path):
+        self.path = path = Path(path)
         if not is_run_directory(path):
             raise StoreError(f"{path}: is no run directory" if path.exists() else f"{path}: there is no such folder")
         self._lock = WriterLock(path)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mc_engine.campaign.loading import Campaign
+from mc_engine.campaign.loading import Campaign, refuse_no_campaign
 from mc_engine.campaign.tuning_section import Constraint, Objective, Tuning
 from mc_engine.errors import CampaignError, Problem, RunInterrupted
 from mc_engine.interruption import stop_signal
@@ -75,6 +75,7 @@ def tune(
     >>> len(record.evaluations)
     8
     """
+    refuse_no_campaign(campaign)
     tuning = campaign.tuning
     if tuning is None:
         message = (
