@@ -86,7 +86,8 @@ class VerdictChange:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Run A (before) and run B (after).  cases, ok : by run, all cases, and those flown to their end.
+    """Run A (before) and run B (after).  cases, ok, wanted : by run, its cases, those of them that completed, and how
+    many it is to have, which are more while it is not complete.
 
     confidence : of every interval, that of B's [report].
     metrics in the order of B's columns; units by metric; left_out : metrics that are not compared, and why.
@@ -98,6 +99,7 @@ class Comparison:
     designs: tuple[str, str]
     cases: tuple[int, int]
     ok: tuple[int, int]
+    wanted: tuple[int, int]
     pairing: Pairing
     alpha: float
     confidence: float
@@ -164,7 +166,7 @@ def compare_runs(
 
     EngineError if they have no metric of the same name and unit: that nothing changed would be no answer.
     """
-    manifests = a.manifest, b.manifest
+    manifests, wanted = (a.manifest, b.manifest), (a.n_cases, b.n_cases)
     tables = a.cases(), b.cases()
     facts = tuple({fact["name"]: fact for fact in manifest["columns"]} for manifest in manifests)
     pairing = pair_cases(tables, (_of_role(facts[0], "dispersion"), _of_role(facts[1], "dispersion")))
@@ -198,6 +200,7 @@ def compare_runs(
         designs=_both(manifests, _design),
         cases=_both(tables, len),
         ok=_both(ok, lambda flown: int(flown.sum())),
+        wanted=wanted,
         pairing=pairing,
         alpha=alpha,
         confidence=confidence,
@@ -205,7 +208,7 @@ def compare_runs(
             replace(change, shift_adjusted=next(adjusted), spread_adjusted=next(adjusted)) for change in changes
         ),
         shares=tuple(replace(share, adjusted=next(adjusted)) for share in shares),
-        verdicts=_verdict_changes(manifests, tables, ok, pairing),
+        verdicts=_verdict_changes(manifests, tables, ok, wanted, pairing),
         units={name: str(facts[1][name].get("unit", "")) for name in metrics},
         left_out=left_out,
         code=code_differences(*manifests),
@@ -279,11 +282,11 @@ def _cases_inside(manifest: Mapping[str, Any], values: list[dict[str, np.ndarray
     }
 
 
-def _verdict_changes(manifests: Any, tables: Any, ok: Any, pairing: Pairing) -> tuple[VerdictChange, ...]:
+def _verdict_changes(manifests: Any, tables: Any, ok: Any, wanted: Any, pairing: Pairing) -> tuple[VerdictChange, ...]:
     """The verdicts of both runs: on the same cases and with the same bounds where they are paired, else on all."""
     looked = [
-        was_looked_at(manifest, max(len(table), int(manifest["campaign"].get("cases", 0))), len(table))
-        for manifest, table in zip(manifests, tables, strict=True)
+        was_looked_at(manifest, n_cases, len(table))
+        for manifest, table, n_cases in zip(manifests, tables, wanted, strict=True)
     ]
     if pairing.paired:
         looked = 2 * [any(looked)]

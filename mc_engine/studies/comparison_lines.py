@@ -17,8 +17,10 @@ _HEADINGS = ("metric", "shift", "in sigma of A", "adjusted p", "spread B/A", "ad
 
 def comparison_lines(comparison: Comparison) -> Iterator[str]:
     """All that a reader needs to act on, the answer last."""
-    for letter, name, cases, ok in zip("AB", comparison.names, comparison.cases, comparison.ok, strict=True):
-        yield f"{letter}  {name}: {counted(cases, 'case')}, {ok:,} completed"
+    runs = zip("AB", comparison.names, comparison.cases, comparison.wanted, comparison.ok, strict=True)
+    for letter, name, cases, wanted, ok in runs:
+        flown = f"{cases:,} of {wanted:,} cases" if cases < wanted else counted(cases, "case")
+        yield f"{letter}  {name}: {flown}, {ok:,} completed"
     yield comparison.pairing.reason
     for verdict in comparison.verdicts:
         inside = verdict.inside_words("{:,}".format)

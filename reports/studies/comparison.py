@@ -136,10 +136,11 @@ def _change_sentence(comparison: Comparison) -> str:
 def _run_facts(comparison: Comparison) -> tuple[tuple[str, str], ...]:
     reason = re.sub(r"(?<=\d),(?=\d{3})", SPACE, comparison.pairing.reason)
     facts = []
-    for letter, name, cases, ok, created in zip(
-        "AB", _short_names(comparison.names), comparison.cases, comparison.ok, comparison.created, strict=True
-    ):
-        flown = f"{counted(cases, 'case')}, {count(ok)} completed"
+    numbers = zip(comparison.cases, comparison.wanted, comparison.ok, strict=True)
+    names = _short_names(comparison.names)
+    for letter, name, (cases, wanted, ok), created in zip("AB", names, numbers, comparison.created, strict=True):
+        of = f"{count(cases)} of {counted(wanted, 'case')}" if cases < wanted else counted(cases, "case")
+        flown = f"{of}, {count(ok)} completed"
         facts.append((f"Run {letter}", f"{name}: {flown}, {created[:16].replace('T', ' ')}".rstrip(", ")))
     return (*facts, ("Cases", f"{reason[:1].upper()}{reason[1:]}"))
 

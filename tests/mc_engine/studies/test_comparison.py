@@ -27,7 +27,9 @@ def test_the_same_run_again_is_no_change(tmp_path):
 
 def test_one_case_and_one_test_are_counted_as_one(tmp_path):
     found = compared(run(tmp_path / "a"), run(tmp_path / "b"))
-    first, *_, last = comparison_lines(replace(found, cases=(1, 400), metrics=(), shares=found.shares[:1]))
+    first, *_, last = comparison_lines(
+        replace(found, cases=(1, 400), wanted=(1, 400), metrics=(), shares=found.shares[:1])
+    )
     assert first.endswith("a: 1 case, 400 completed")
     assert "(1 test, at most" in last
 
@@ -205,9 +207,17 @@ def test_intervals_have_the_confidence_of_the_second_report_and_metrics_need_one
     assert found.left_out == ("range_m: in m in A, in km in B",)
 
 
-@pytest.mark.parametrize(("looks", "outcome"), [([], "pass"), ([25], "not demonstrable")])
-def test_verdicts_on_pairs_have_the_bounds_of_the_run_whose_size_was_not_fixed(tmp_path, looks, outcome):
+@pytest.mark.parametrize(
+    ("looks", "extended", "outcome"),
+    [([], 25, "pass"), ([25], 25, "not demonstrable"), ([], 90, "not demonstrable")],
+)
+def test_verdicts_on_pairs_have_the_bounds_of_the_run_whose_size_was_not_fixed(tmp_path, looks, extended, outcome):
     """Time-uniform bounds ask for more cases than those of a run of fixed size."""
     a, b = run(tmp_path / "a", n=25, limit=99.0), run(tmp_path / "b", n=25, limit=99.0, looks=looks)
-    [verdict] = compared(a, b).verdicts
+    if extended > 25:  # and interrupted before the first of the new cases
+        b.note("extended", cases=extended)
+    flown = "25 of 90 cases" if extended > 25 else "25 cases"
+    found = compared(a, b)
+    [verdict] = found.verdicts
+    assert list(comparison_lines(found))[:2] == ["A  a: 25 cases, 25 completed", f"B  b: {flown}, 25 completed"]
     assert (verdict.before, verdict.after) == (outcome, outcome)
