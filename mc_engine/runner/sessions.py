@@ -89,22 +89,38 @@ def _fly_missing(store: Store, campaign: Campaign, session: Session, repair: boo
     store.note("started", backend=session.backend.name, workers=session.workers, chunk=size, missing=missing)
     begin = time.perf_counter()
     nominal = bool(_nominal_problem(store))
+    further = campaign.sensitivity.flights if _has_companion(store, campaign) and campaign.sensitivity else 0
+    before = _counting(session, further if store.notes("companion") else 0, further)
 
     def commit(done: Done) -> None:
         store.publish(*(written for _, written in done))
 
-    begun = _run_tasks(store, campaign, session, nominal, tasks, commit, stop.is_set)
+    begun = _run_tasks(store, campaign, before, nominal, tasks, commit, stop.is_set)
     if (problem := _nominal_problem(store)) or store.missing():
         raise _interrupted(store, f"; {problem}" if store.nominal_part and problem else "")
     remove_logs(store.path)
     flown = time.perf_counter()
     _fly_histories(store, campaign, session, stop.is_set)
-    if campaign.sensitivity is not None and campaign.design != PICK_FREEZE and len(store.wanted) == store.n_cases:
+    if _has_companion(store, campaign):
         _fly_companion(store, campaign, session, repair, stop)
         if not store.notes("companion"):
             store.note("companion")
     times = {"prepare_s": round(begun - begin, 3), "fly_s": round(flown - begun, 3)}
     store.note("finished", **times, integration=integration_changes(store, campaign))
+
+
+def _has_companion(store: Store, campaign: Campaign) -> bool:
+    """Whether the flights for sensitivities belong to the run; a shard has none."""
+    asked = campaign.sensitivity is not None and campaign.design != PICK_FREEZE
+    return asked and len(store.wanted) == store.n_cases
+
+
+def _counting(session: Session, flown: int, cases: int, failed: int = 0) -> Session:
+    """The session whose progress also counts `cases` of another stage, of which so many are flown and failed."""
+    report = session.progress
+    if report is None:
+        return session
+    return replace(session, progress=lambda n, total, lost: report(flown + n, cases + total, failed + lost))
 
 
 @contextmanager
@@ -238,17 +254,12 @@ def _fly_companion(store: Store, campaign: Campaign, session: Session, repair: b
     elif repair:
         mend_journal(path)
     counts = store.status_counts()
-    flown, all_failed = sum(counts.values()), _failed(counts)
-
-    def report(cases: int, total: int, failed: int) -> None:
-        if session.progress is not None:
-            session.progress(flown + cases, flown + total, all_failed + failed)
-
+    after = _counting(session, sum(counts.values()), sum(counts.values()), _failed(counts))
     inner = open_store(path)
     if inner.manifest["campaign"]["digest"] != beside.digest:
         raise StoreError(f"{path}: holds flights of another campaign; remove it, and `resume` flies them anew")
     with inner.lock():
-        _fly_missing(inner, beside, replace(session, progress=report, chunk=None), repair, stop)
+        _fly_missing(inner, beside, replace(after, chunk=None), repair, stop)
 
 
 def _nominal_problem(store: Store) -> str:

@@ -101,9 +101,10 @@ def test_flights_broken_off_are_resumed_to_the_same_bytes(tmp_path):
     asked = campaign(tmp_path, "[sensitivity]\ncases = 512\n[sensitivity.group]\nodd = ['x1', 'x3']\n")
     runner.run(asked, tmp_path / "whole", chunk=64)
 
-    sent = []
+    sent, totals = [], set()
 
     def stop(done, total, failed):
+        totals.add(total)
         if done > 1000 and not sent:
             sent.append(done)
             signal.raise_signal(signal.SIGINT)
@@ -111,7 +112,8 @@ def test_flights_broken_off_are_resumed_to_the_same_bytes(tmp_path):
     with pytest.raises(RunInterrupted, match="resume"):
         runner.run(asked, tmp_path / "run", progress=stop)
     assert open_store(tmp_path / "run" / "sensitivity").missing()
-    runner.resume(tmp_path / "run")
+    runner.resume(tmp_path / "run", progress=stop)
+    assert totals == {asked.cases + 512 * (4 + 4)}  # from the first call on
     ours, theirs = (open_store(tmp_path / name / "sensitivity").cases() for name in ("run", "whole"))
     assert len(ours) == 512 * (4 + 4)  # groups: odd, x2, x4 and the random draws, which have two rows more
     assert ours.equals(theirs)
