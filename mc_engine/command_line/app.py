@@ -49,7 +49,7 @@ class _Commands(TyperGroup):
 def _converted(kind: Any, value: Any, param: Any, ctx: Any) -> Any:
     whole = kind.name.startswith("int")
     if isinstance(value, str) and not (is_whole(value) if whole else is_real(value) and isfinite(float(value))):
-        most = f" of at most {LARGEST_WHOLE:,}" if whole else ", such as 0.5 or 1e-3"
+        most = f" in digits alone, such as 10000, of at most {LARGEST_WHOLE}" if whole else ", such as 0.5 or 1e-3"
         kind.fail(f"{value!a} is not a {'whole ' if whole else ''}number{most}", param, ctx)
     return kind.convert(value, param, ctx)
 
@@ -103,6 +103,8 @@ def _on_disk(text: str, instead: str) -> Path:
         leave(USAGE, f"{url}: is a URL, and a local path is needed here; {instead.format(shell_word(url))}")
     if text != readable(text):
         leave(USAGE, f"{readable(text)}: {NO_TEXT}")
+    if not text:
+        leave(USAGE, "a name is empty where a folder or a file has to be named; write . for the working folder")
     return Path(text)
 
 
@@ -209,6 +211,8 @@ def _no_run(path: Path) -> str:
         return f"is a campaign and no run; `mc-engine run {shell_word(path)}` flies it"
     if not path.exists():
         return "there is no such folder; `mc-engine run` makes one"
+    if path.is_file() and kind_of(path.parent):
+        return f"is a file of a {kind_of(path.parent)}; name its directory, {path.parent}"
     if runs := runs_in(path):
         return f"is no run directory; it holds {counted(len(runs), 'run')}, the latest is {runs[-1]}"
     return "is no run directory; `mc-engine run` makes one"

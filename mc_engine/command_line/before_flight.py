@@ -21,6 +21,7 @@ from mc_engine.command_line.app import (
     leave,
     new_file,
     refuse_unwritable_file,
+    refuse_unwritable_folder,
 )
 from mc_engine.numbers_in_text import LEAST_SHARE, counted
 from mc_engine.safe_path import safe_environment
@@ -40,6 +41,7 @@ def init(
     from mc_engine.campaign.search import SHIPPED
 
     names = ("campaign.toml", "model.py")
+    refuse_unwritable_folder(folder, option="")
     for name in names:
         if (folder / name).exists():
             leave(USAGE, f"{folder / name}: is there already; choose another folder")

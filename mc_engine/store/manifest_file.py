@@ -22,6 +22,7 @@ from mc_engine.store.parts import CASE_COLUMNS, Column
 from mc_engine.store.receipts import validated
 
 FORMAT = 1  # of the directory; the manifest's "format"
+NEWER = "was written by a newer engine"
 
 CaseNumber = Annotated[int, Field(ge=0, le=MOST_CASES)]
 Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
@@ -264,7 +265,7 @@ def checked_record(content: bytes | str, kind: type[_Kind], newest: int) -> tupl
     """
     record = from_json(content, allow_inf_nan=False)
     if isinstance(record, dict) and isinstance(record.get("format"), int) and record["format"] > newest:
-        raise ValueError(f"was written by a newer engine; this one reads format {newest}")
+        raise ValueError(f"{NEWER}; this one reads format {newest}: update mc-engine")
     checked = validated(kind, record)
     return dict(record), checked
 

@@ -33,7 +33,7 @@ from mc_engine.store.journal import Entry, Scan, read_journal, scan
 from mc_engine.store.parts import PART_FOLDERS, is_part_file
 from mc_engine.store.receipts import receipts_of
 from mc_engine.store.run_files import CAMPAIGN, JOURNAL, MANIFEST, SENSITIVITY, is_run_directory
-from mc_engine.store.urls import is_url, store_url
+from mc_engine.store.urls import ON_DISK, is_url, store_url
 from mc_engine.store.writer_lock import LOCK_FILES, WriterLock
 
 _INNER = f"{SENSITIVITY}/{JOURNAL}"  # of the flights for sensitivities, a run directory inside the run
@@ -60,6 +60,7 @@ def publish(run: Path, url: str, trusting: bool = False) -> Publication:
     """
     if not is_run_directory(run):
         raise UsageError(f"{run}: is no run directory")
+    _refuse_inside(run, url)
     derived, verify = derived_files(run), f"`mc-engine verify {shell_word(run)}` names all damage"
     with _naming(verify):
         journal = _sound(scan(read_journal(run / JOURNAL)), run / JOURNAL)
@@ -219,6 +220,12 @@ def _others(run: Path, counted: Mapping[str, str], derived: CountedFiles) -> lis
     return [name for name in left if not is_temporary(Path(name).name)]
 
 
+def _refuse_inside(run: Path, url: str) -> None:
+    scheme, _, place = store_url(url).partition("://")
+    if scheme in ON_DISK and Path(place).resolve().is_relative_to(run.resolve()):
+        raise UsageError(f"{url}: lies in {run} itself, and each copy would hold the one before; choose another place")
+
+
 def _sound(journal: Scan, place: Path | str) -> Scan:
     """The journal itself; StoreError if a line of it is damaged."""
     if journal.damaged or not journal.entries or journal.entries[0].event != "created":
@@ -327,6 +334,7 @@ class Publisher:
     """
 
     def __init__(self, run: Path, url: str, every_s: float = 30.0):
+        _refuse_inside(run, url)
         self._run, self._url, self._every_s = run, store_url(url), every_s
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._keep_up, name="publisher", daemon=True)

@@ -7,9 +7,9 @@ from mc_engine.errors import EngineError
 
 _EXAMPLE = "such as s3://bucket/runs/deorbit"
 _BEGIN = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")  # of one letter it is a drive of Windows
-_ON_DISK = ("file", "local")
+ON_DISK = ("file", "local")
 _WITH_USER = ("abfs", "abfss", "ftp", "hdfs", "sftp", "smb", "ssh", "webhdfs")  # what stands before @ is no secret
-_HOST_OPTIONAL = (*_ON_DISK, "memory", "hdfs", "dbfs")
+_HOST_OPTIONAL = (*ON_DISK, "memory", "hdfs", "dbfs")
 
 
 def is_url(place: str | Path) -> bool:
@@ -46,7 +46,7 @@ def _problem(scheme: str, rest: str) -> str:
         (re.search(r"[?#]", rest), f"has a ? or #, behind which nothing counts; write a URL {_EXAMPLE}"),
         (not rest.isprintable() or " " in rest, "has a space or a character that cannot be seen; leave it out"),
         (not _is_known(scheme), f'"{scheme}" is no object store that is known; write a URL {_EXAMPLE}'),
-        (scheme in _ON_DISK and (host or not parts), f"names no absolute path; write {scheme}:///runs/deorbit"),
+        (scheme in ON_DISK and (host or not parts), f"names no absolute path; write {scheme}:///runs/deorbit"),
         (not host and (scheme not in _HOST_OPTIONAL or not parts), f"names no bucket or path; write one {_EXAMPLE}"),
         ({".", "..", ""} & {host or "x", *parts}, 'has an empty part, "." or ".." in its path; leave it out'),
     )

@@ -17,7 +17,7 @@ from mc_engine.shell_words import shell_word
 from mc_engine.store.derived_files import STRANGE, derived_files, remade_by
 from mc_engine.store.histories import read_histories
 from mc_engine.store.journal import Scan, read_journal, scan
-from mc_engine.store.manifest_file import cases_in, columns_in, edited_files, parse_manifest
+from mc_engine.store.manifest_file import NEWER, cases_in, columns_in, edited_files, parse_manifest
 from mc_engine.store.parts import PART_FOLDERS, is_part_file, problem_of, read_part
 from mc_engine.store.receipts import Receipts, receipts_of
 from mc_engine.store.result_folder import COMMANDS, read_result, result_files
@@ -41,6 +41,7 @@ ORIGINAL = "put back the original of {1}, or fetch a copy of the run; without it
 IN_THE_WAY = "move {1} out of the run, then `mc-engine resume {0} --repair`: no writer can go on with it in its way"
 RESUME = "left by an interrupted writer; the next `resume` removes it, and flies the rest"  # no damage
 AWAY = "move {1} out of the run: whatever reads its folder takes it for cases"
+UPDATE = "update mc-engine, and verify again: whether anything is damaged is not known"
 AGAIN = "put back the original of {1}, or let `mc-engine %s` make the result again, in another folder"
 _SESSION = ("started", "rerun", "finished", "interrupted")
 
@@ -109,7 +110,7 @@ def _result_damages(folder: Path, kind: str) -> list[Damage]:
         if not problems:
             read_result(folder, kind)
     except StoreError as error:
-        problems.append(Damage(_without_folder(folder, error), again))
+        problems.append(Damage(_without_folder(folder, error), UPDATE if NEWER in str(error) else again))
     return problems
 
 
@@ -124,7 +125,8 @@ def _run_damages(run: Path) -> tuple[list[Damage], Collection[str]]:
         journal = scan(read_journal(run / JOURNAL))
     except StoreError as error:
         return [Damage(_without_folder(run, error), ORIGINAL)], ()
-    begun, problems = _begun_with(journal), [Damage(text, ORIGINAL) for text in _head_problems(run, journal)]
+    heads = list(_head_problems(run, journal))
+    begun, problems = _begun_with(journal), [Damage(text, UPDATE if NEWER in text else ORIGINAL) for text in heads]
     manifest = None if problems else parse_manifest(read_short(run / MANIFEST))
     counted, wrong = receipts_of(journal.entries, None if manifest is None else manifest["campaign"]["cases"])
     killed = not busy and is_left_by_dead(run) and not (journal.damaged or wrong)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mc_engine.numbers_in_text import counted
 from mc_engine.store.result_folder import read_result
 from mc_engine.store.run_files import TUNING
 
@@ -68,9 +69,8 @@ def tuning_lines(record: TuningRecord) -> list[str]:
     """How the search ended, for the command line."""
     tuning, evaluations = record.manifest["tuning"], record.evaluations
     inside = int(evaluations["feasible"].sum())
-    lines = [
-        f"candidates   {len(evaluations):,} in {tuning['flown']} generations ({tuning['end']}), {inside:,} feasible"
-    ]
+    flown = f"{len(evaluations):,} in {counted(tuning['flown'], 'generation')}"
+    lines = [f"candidates   {flown} ({tuning['end']}), {inside:,} feasible"]
     if not record.feasible:
         return [*lines, f"front        {infeasibility(record)}"]
     lines.append(f"front        {front_words(record, '{:,}'.format)}")

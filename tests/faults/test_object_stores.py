@@ -10,7 +10,7 @@ from stones import stones
 from typer.testing import CliRunner
 
 from mc_engine.command_line.commands import app
-from mc_engine.errors import StoreError
+from mc_engine.errors import StoreError, UsageError
 from mc_engine.store.derived_files import derived_files
 from mc_engine.store.object_store import Publisher, _Remote, fetch, publish
 from mc_engine.store.opening import open_store
@@ -162,6 +162,14 @@ def test_another_run_or_other_files_or_a_later_state_are_not_overwritten(memory,
     fsspec.filesystem("memory").pipe_file("elsewhere/thesis.txt", b"x")
     with pytest.raises(StoreError, match=r"holds thesis\.txt and no run"):
         publish(run, "memory://elsewhere")
+
+
+def test_a_run_is_not_copied_into_itself(run):
+    before = digests(run)
+    for send in (publish, Publisher):  # the latter before the flight
+        with pytest.raises(UsageError, match=f"copy: lies in {run} itself"):
+            send(run, f"file://{run}/copy")
+    assert digests(run) == before
 
 
 @pytest.mark.parametrize("lost", [False, True], ids=["damaged", "lost"])

@@ -41,6 +41,10 @@ def test_a_slip_is_answered_with_what_is_there_or_the_next_command(here):
     for words, said in [
         (["status", "deorbit"], "deorbit: is a campaign and no run; `mc-engine run deorbit` flies it"),
         (["status", "runs"], "runs: is no run directory; it holds 2 runs, the latest is runs/a"),
+        (["status", "runs/a/manifest.json"], "runs/a/manifest.json: is a file of a run; name its directory, runs/a"),
+        (["run", "cart", "--cases", "1,000"], "'1,000' is not a whole number in digits alone, such as 10000"),
+        (["run", "cart", "--out", ""], "a name is empty where a folder or a file has to be named"),
+        (["init", "cart/model.py"], "cart/model.py: cart/model.py is no folder that can be written to"),
         (["status", "cart"], "cart: is no run directory; `mc-engine run` makes one"),
         (["summary", "its tuning"], "its tuning: holds a tuning and no run; `mc-engine status 'its tuning'` shows"),
         (["resume", "its rare"], "its rare: holds a rare event and no run; `mc-engine status 'its rare'` shows what"),

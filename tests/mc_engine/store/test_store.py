@@ -17,7 +17,7 @@ from mc_engine.store.opening import open_store
 from mc_engine.store.parts import write_aside
 from mc_engine.store.run_files import NOMINAL_CASE, is_run_directory
 from mc_engine.store.store import create_store
-from mc_engine.store.verification import damage
+from mc_engine.store.verification import damage, damages, remedies
 
 # ---- a store gives back what was put in
 
@@ -251,10 +251,12 @@ def test_a_folder_without_a_run_is_named_in_the_refusal(tmp_path):
     assert not is_run_directory(tmp_path)
 
 
-def test_a_run_of_a_newer_engine_is_refused(run):
+def test_a_run_of_a_newer_engine_is_refused_and_not_said_to_be_damaged(run):
     create = {**MANIFEST, "format": 2}
-    with pytest.raises(StoreError, match="newer engine"):
+    with pytest.raises(StoreError, match=r"newer engine; this one reads format 1: update mc-engine$"):
         create_store(run, create, TEXT, COLUMNS)
+    [problem] = [item for item in damages(run) if item.file == "manifest.json"]
+    assert remedies(run, [problem]) == ["update mc-engine, and verify again: whether anything is damaged is not known"]
 
 
 # ---- speed
