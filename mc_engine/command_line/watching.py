@@ -27,6 +27,7 @@ from mc_engine.interruption import advise, unsignalled_children
 from mc_engine.store.run_files import JOURNAL
 
 CASES = 200  # of each flight, unless told otherwise
+_NOTE = re.compile(r"preparing; |[0-9,]+ (further cases are flown|of [0-9,]+ cases)")  # on how far a flight is
 _LOOK_EVERY_S = 0.3
 _PATIENCE_S = 5.0  # for a flight that is no longer wanted to end
 _MOST_FILES = 2000  # that are looked at
@@ -140,8 +141,7 @@ def _outcome(flight: "subprocess.Popen[str]", file: Path, seen: dict[Path, tuple
     while True:
         with suppress(subprocess.TimeoutExpired):
             out, error = flight.communicate(timeout=_LOOK_EVERY_S)
-            notes = ("preparing; ", "cases ", "histories ")
-            return out, "\n".join(line for line in error.splitlines() if not line.startswith(notes)).strip()
+            return out, "\n".join(line for line in error.splitlines() if not _NOTE.match(line)).strip()
         if _stamps(file) != seen:
             return None
 

@@ -61,7 +61,7 @@ def test_every_saved_change_is_flown_and_a_mistake_is_told_above_the_results_bef
         assert not re.search(rb'(?:src|href)="?https?:', (page / "watch.html").read_bytes())
         save(folder / "model.py", model.replace("vy=g * s.y)", "vy=g * s.z)"))
         mistake = shown_when(page, lambda state: state["mistake"])
-        assert "model.py, line 30" in mistake["mistake"]
+        assert mistake["mistake"].startswith("model.py, line 30")
         assert mistake["report"] == first["report"]
         assert mistake["line"].endswith("not flown; below, the results before the mistake")
         assert (page / "report.html").read_bytes() == report
