@@ -34,7 +34,7 @@ from mc_engine.command_line.app import (
     run_here,
     write_reports,
 )
-from mc_engine.command_line.next_step import MERGE, after_flight, is_complete
+from mc_engine.command_line.next_step import MERGE, after_flight, is_complete, journal_lines
 from mc_engine.errors import RunInterrupted
 from mc_engine.interruption import NOTHING_BEGUN, advise, raise_if_signalled
 from mc_engine.shell_words import shell_word
@@ -150,7 +150,8 @@ def _worker_options(
     from mc_engine.runner.backends import Backend
 
     chosen = Backend(backend, scheduler, case_seconds, memory, patience)
-    advise(lambda: after_flight(folder, chosen.options(), url, rerun))
+    lines = journal_lines(folder)
+    advise(lambda: after_flight(folder, chosen.options(), url, rerun, lines))
     return {"workers": workers, "backend": chosen}
 
 

@@ -13,10 +13,11 @@ MERGE = "`mc-engine merge RUN SHARD...` makes one run of all shards, and its rep
 _UNFINISHED = ("created", "started", "rerun", "extended", "part-withdrawn")  # events that `finished` has to follow
 
 
-def after_flight(run: Path, options: str = "", url: str | None = None, rerun: bool = False) -> str:
+def after_flight(run: Path, options: str = "", url: str | None = None, rerun: bool = False, lines: int = 0) -> str:
     """The message for a flight into the directory `run`.
 
     options : those of the backend.  url : where the run is published.  rerun : the flight was of failed cases.
+    lines : of the journal when the command began
     """
     if not (run / JOURNAL).is_file():
         return NOTHING_BEGUN
@@ -28,6 +29,8 @@ def after_flight(run: Path, options: str = "", url: str | None = None, rerun: bo
         command = "rerun --failed" if rerun and "rerun" in events else "resume"
         again = f"`mc-engine {command} {shell_word(run)}{options}{f' --publish {shell_word(url)}' if url else ''}`"
         return f"interrupted; what was committed is safe, {again} flies the rest"
+    if len(events) == lines:  # neither `extend` nor `rerun` had begun
+        return NOTHING_BEGUN
     if manifest.get("shard"):
         return f"interrupted; all cases of the shard are in {run}, `mc-engine merge RUN SHARD...` joins the shards"
     copy = f", `mc-engine publish {shell_word(run)} {shell_word(url)}` sends them and the cases" if url else ""
@@ -42,6 +45,11 @@ def is_complete(run: Path) -> bool:
     store = open_store(run)
     finished = _is_finished(_events(run)) and not store.missing() and not store.lost_files()
     return finished and not is_left_by_dead(run)
+
+
+def journal_lines(run: Path) -> int:
+    """How many lines the journal of a run has; 0 if there is none."""
+    return len(_events(run)) if (run / JOURNAL).is_file() else 0
 
 
 def _events(run: Path) -> list[str]:

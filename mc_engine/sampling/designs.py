@@ -82,7 +82,9 @@ def extension_problem(manifest: Mapping[str, Any], has: int, cases: int) -> str:
         return "is a shard; merge the shards, and extend the whole"
     if design not in EXTENSIBLE:
         return f'the design "{design}" cannot be extended; {", ".join(EXTENSIBLE)} can'
-    return "" if cases > has else f"has {has} cases; give the number it is to have in all"
+    if cases > has:
+        return ""
+    return f"is to have {has} cases already; give a larger number in all, or `resume` it where cases are missing"
 
 
 def _saltelli(seed: int, names: Sequence[str], block: np.ndarray, row: np.ndarray) -> list[np.ndarray]:

@@ -12,8 +12,10 @@ import pytest
 from cart import CAMPAIGN, MODEL, call, fails_with, small_store
 
 from mc_engine.campaign.search import SHIPPED
-from mc_engine.command_line.next_step import after_flight, after_search
+from mc_engine.command_line.next_step import after_flight, after_search, journal_lines
 from mc_engine.errors import DiskError, StoreError
+from mc_engine.interruption import NOTHING_BEGUN
+from mc_engine.runner import runner
 from mc_engine.store import store
 from mc_engine.store.journal import damaged_line
 from mc_engine.store.opening import open_store
@@ -103,6 +105,19 @@ def test_a_run_that_is_complete_is_not_flown_again(here):
     assert "`mc-engine report flown` writes the reports anew" in answer.stdout
     assert len(open_store("flown").notes()) == before
     assert not (here / "flown" / "report.html").exists()
+
+
+def test_an_extension_that_was_interrupted_before_it_began_is_not_said_to_be_there(here, monkeypatch):
+    small_store(here / "flown").note("finished")
+    monkeypatch.setattr(runner, "extend", lambda *_, **__: _interrupted())
+    fails_with(4, call("extend", "flown", "--cases", 50), NOTHING_BEGUN)
+    lines = journal_lines(here / "flown")
+    open_store(here / "flown").note("extended", cases=50)
+    assert "`mc-engine resume " in after_flight(here / "flown", lines=lines)
+
+
+def _interrupted():
+    raise KeyboardInterrupt
 
 
 def test_a_complete_run_that_cannot_be_extended_is_not_said_to_be(here):

@@ -241,7 +241,9 @@ def test_extend_takes_the_new_number_of_cases(here, calls):
     assert result.exit_code == 0
     assert calls.runner == [("extend", "flown", 60)]
     assert "40 of 60 cases" in result.stdout
-    fails_with(2, call("extend", "flown", "--cases", 60), "flown: has 60 cases; give the number it is to have in all")
+    fails_with(
+        2, call("extend", "flown", "--cases", 60), "flown: is to have 60 cases already; give a larger number in all"
+    )
 
 
 def test_a_run_tells_of_the_further_cases_that_its_contributions_take(here, calls):

@@ -122,8 +122,8 @@ def test_a_number_of_cases_that_cuts_a_block_is_told_the_nearest_that_do_not():
     ("manifest", "cases", "message"),
     [
         ({}, 1001, ""),
-        ({}, 1000, "has 1000 cases"),
-        ({}, 999, "has 1000 cases"),
+        ({}, 1000, "is to have 1000 cases already"),
+        ({}, 999, "is to have 1000 cases already"),
         ({"campaign": {"design": "lhs"}}, 2000, 'the design "lhs" cannot be extended; mc, sobol, saltelli, morris can'),
         ({"shard": {"number": 1, "of": 2}}, 2000, "is a shard"),
         ({"upstream": {}}, 2000, "takes its inputs from another run"),
