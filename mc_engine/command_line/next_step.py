@@ -53,9 +53,9 @@ def journal_lines(run: Path) -> int:
 
 
 def _events(run: Path) -> list[str]:
-    from mc_engine.store.journal import scan
+    from mc_engine.store.journal import read_journal, scan
 
-    return [entry.event for entry in scan((run / JOURNAL).read_bytes()).entries]
+    return [entry.event for entry in scan(read_journal(run / JOURNAL)).entries]
 
 
 def _is_finished(events: list[str]) -> bool:
