@@ -238,7 +238,7 @@ def merge(
 
     StoreError if cases are missing, or if the shards are not of one campaign; see `mc_engine.runner.shards`.
     """
-    store, campaign = merge_shards(Path(out), [Path(shard) for shard in shards], chunk)
+    store, campaign = merge_shards(Path(out), [Path(shard) for shard in shards], chunk, workers)
     return complete(store, campaign, session_of(progress, workers, chunk, THREADS))
 
 

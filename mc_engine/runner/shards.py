@@ -6,9 +6,11 @@ process: the same table and, with the same chunk, the same part files.
 
 import os
 import re
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from functools import partial
+from itertools import islice, takewhile
 from pathlib import Path
 
 import numpy as np
@@ -18,16 +20,18 @@ from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.search import campaign_names
 from mc_engine.errors import StoreError, UsageError
 from mc_engine.flight.chunks import chunk_size, chunks_of
+from mc_engine.interruption import in_threads
 from mc_engine.runner.flown_campaign import campaign_of, companions_of
 from mc_engine.runner.manifest import columns_of, manifest_of
 from mc_engine.shell_words import shell_word
 from mc_engine.store import parts
 from mc_engine.store.opening import open_store
-from mc_engine.store.parts import Part
+from mc_engine.store.parts import Part, Written
 from mc_engine.store.receipts import gaps
 from mc_engine.store.store import Store, create_store
 
 _MOST_COMMANDS = 100  # that a sentence names
+_TOGETHER = 4  # parts of each thread that are published together
 
 
 @dataclass(frozen=True)
@@ -74,31 +78,41 @@ class Piece:
         return Piece(self.store, self.part, max(first, self.first), min(stop, self.stop))
 
 
-def merge_shards(out: Path, folders: Sequence[Path], chunk: int | None = None) -> tuple[Store, Campaign]:
+def merge_shards(
+    out: Path, folders: Sequence[Path], chunk: int | None = None, workers: int | None = None
+) -> tuple[Store, Campaign]:
     """Make a run directory with the cases of all shards.  Returns it and its campaign; `complete` adds the rest.
 
     folders : run directories of shards, in any order; they may overlap or be incomplete.  chunk : cases of a part, by
-    default as in a run on all cores of this machine.
+    default as in a run on all cores of this machine.  workers : threads, by default one per core.
     UsageError if cases are missing or the directories are not of one campaign; StoreError if two differ on a case.
     """
     stores = [open_store(folder) for folder in folders]
     _check_one_campaign(stores)
     _check_nothing_missing(stores)
-    _check_parts(stores)  # before `out` is made
+    threads = workers or os.cpu_count() or 1
+    _check_parts(stores, threads)  # before `out` is made
     pieces = list(_cover(stores))
     campaign = campaign_of(stores[0])
     run = create_store(out, manifest_of(campaign), campaign.text, columns_of(campaign), companions_of(campaign))
     size = chunk or chunk_size(campaign.cases, os.cpu_count() or 1)
     with run.lock():
         run.note("merged", shards=len(stores), chunk=size)
-        for first, stop in chunks_of([(0, campaign.cases)], size):
-            tables = [
-                piece.between(first, stop).table() for piece in pieces if piece.first < stop and first < piece.stop
-            ]
-            table = pa.concat_tables(tables)
-            columns = {name: table[name].to_numpy() for name in table.column_names}
-            run.append(first, stop - first, columns)
+        bounds = [*chunks_of([(0, campaign.cases)], size)]
+        for begin in range(0, len(bounds), _TOGETHER * threads):
+            together = bounds[begin : begin + _TOGETHER * threads]
+            run.publish(*in_threads(partial(_write_part, run, pieces), together, threads))
     return run, campaign
+
+
+def _write_part(run: Store, pieces: Sequence[Piece], bounds: tuple[int, int]) -> Written:
+    """The part of these cases, under a temporary name.  pieces : all cases, in order."""
+    first, stop = bounds
+    place = bisect_right(pieces, first, key=lambda piece: piece.stop)
+    inside = takewhile(lambda piece: piece.first < stop, islice(pieces, place, None))
+    table = pa.concat_tables([piece.between(first, stop).table() for piece in inside])
+    columns = {name: table[name].to_numpy() for name in table.column_names}
+    return parts.write_aside(run.path, run.columns, first, stop - first, columns)
 
 
 def _check_one_campaign(stores: Sequence[Store]) -> None:
@@ -115,11 +129,19 @@ def _check_one_campaign(stores: Sequence[Store]) -> None:
             )
 
 
-def _check_parts(stores: Sequence[Store]) -> None:
+def _check_parts(stores: Sequence[Store], threads: int) -> None:
     """StoreError that names the first part that is damaged or has other columns."""
-    for store in stores:
-        for part in store.parts:
-            parts.read_part(store.path, part, stores[0].columns)
+
+    def problem(part: tuple[Store, Part]) -> StoreError | None:
+        try:
+            parts.read_part(part[0].path, part[1], stores[0].columns)
+        except StoreError as error:
+            return error
+        return None
+
+    for found in in_threads(problem, [(store, part) for store in stores for part in store.parts], threads):
+        if found is not None:
+            raise found
 
 
 def _check_nothing_missing(stores: Sequence[Store]) -> None:
