@@ -153,6 +153,8 @@ def fly_cases(
     with naming_faults(campaign.model_reference, cases_in_words(case_ids.min(), case_ids.max())):
         for piece in (slice(*edge) for edge in pairwise(edges)):
             inputs = full_inputs(campaign, {name: column[piece] for name, column in table.items()})
+            if guard is not _unguarded:
+                flyer.start()
             with guard(case_ids[piece]):
                 rows = None if log is None else log.of(case_ids[piece])
                 flights.append(flyer.fly(inputs, noise[piece], rows, keep, stopped))

@@ -86,6 +86,10 @@ class Flyer(ABC):
     def make_ready(self) -> None:
         """Compile or load what flies, before several workers ask for it."""
 
+    def start(self) -> None:
+        """Start the process that will fly the next cases, if they need one; no limit on their time counts its start."""
+        return
+
     @abstractmethod
     def faults(self) -> list[str]:
         """Sentences on what is wrong with it, as far as it shows at once; empty if nothing."""

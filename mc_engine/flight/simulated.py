@@ -95,6 +95,9 @@ class SimulatorFlyer(Flyer):
     def make_ready(self) -> None:
         """Nothing: each worker starts a process of its own."""
 
+    def start(self) -> None:
+        self.give_back(self.process())
+
     def faults(self) -> list[str]:
         if self._simulator.fly is None and not self._simulator.is_described:
             why = "has no function `fly`, no command and no FMU; `mc-engine import` reads results from elsewhere"

@@ -232,12 +232,15 @@ def test_a_model_that_calls_exit_is_told_and_not_waited_for(tmp_path, backend):
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere a function ends its own programs")
-def test_a_time_limit_of_a_simulator_leaves_neither_programs_nor_folders(tmp_path, monkeypatch):
+def test_a_time_limit_counts_the_flight_alone_and_leaves_neither_programs_nor_folders(tmp_path, monkeypatch):
     fault = "if case.id == 1:\n    import subprocess\n    subprocess.run(['sleep', '4322'])"
-    campaign = load_campaign(python_campaign(tmp_path / "ball", cases=2, fault=fault))
+    file = python_campaign(
+        tmp_path / "ball", cases=2, fault=fault, imports="import time", options="start=lambda: time.sleep(3.2),"
+    )
+    campaign = load_campaign(file)
     (tmp_path / "temporary").mkdir()
     monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
-    table = runner.run(campaign, tmp_path / "run", workers=1, backend=Backend("loky", case_seconds=5.0)).cases()
+    table = runner.run(campaign, tmp_path / "run", workers=1, backend=Backend("loky", case_seconds=3.0)).cases()
     assert table["status"].tolist() == ["ok", "time-limit"]
     assert ["sleep", "4322"] not in [process.info["cmdline"] for process in psutil.process_iter(["cmdline"])]
     assert list((tmp_path / "temporary").glob("mc-engine-*")) == []
