@@ -2,12 +2,17 @@
 
 Linux has the means to end every process that a program began, to see its memory while it runs, and to end it with the
 engine; elsewhere only its own process group is ended.
+
+As a program, `python -m mc_engine.process_tree MODULE DESCRIPTOR FOLDER PARENT`, it is the guard of a process that runs
+foreign code, the `main` of the module: it ends with it whatever that began, also when the engine is killed.
 """
 
 import ctypes
 import os
+import shutil
 import signal
 import sys
+from importlib import import_module
 from pathlib import Path
 
 _PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
@@ -122,3 +127,46 @@ def let_forks_be_terminated() -> None:
         after_in_parent=lambda: signal.pthread_sigmask(signal.SIG_UNBLOCK, mask),
         after_in_child=in_child,
     )
+
+
+def _guard(parent: int, descriptor: int, folder: Path) -> int:
+    """The process number of the guard: in a child of this process, which goes on; the guard itself never returns.
+
+    It ends when its child has ended, in the same way, or by SIGHUP, also while code in the child lets no Python run;
+    then no process is left that the child began.  It ends with its parent, too, by SIGTERM, and removes the folder.
+    descriptor : of the child alone.
+    """
+    adopt_orphans()
+    guard = os.getpid()
+    child = os.fork()
+    if not child:
+        die_with_parent(guard, signal.SIGKILL)
+        return guard
+
+    def end(by: int, _: object) -> None:
+        end_children(set())
+        if by == signal.SIGTERM:
+            shutil.rmtree(folder, ignore_errors=True)
+        os._exit(1)
+
+    os.close(descriptor)
+    for by in (signal.SIGHUP, signal.SIGTERM):
+        signal.signal(by, end)
+    die_with_parent(parent, signal.SIGTERM)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    end_children(set())
+    if code < 0:
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # its child has left one, where they are wanted
+        if code != -signal.SIGKILL:
+            signal.signal(-code, signal.SIG_DFL)
+        os.kill(guard, -code)
+    os._exit(code)
+
+
+if __name__ == "__main__":
+    _module, _descriptor, _folder, _parent = sys.argv[1], int(sys.argv[2]), Path(sys.argv[3]), int(sys.argv[4])
+    if _LINUX:
+        _parent = _guard(_parent, _descriptor, _folder)
+    import_module(_module).main(_descriptor, _folder, _parent)

@@ -16,6 +16,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,9 @@ from mc_engine.process_tree import how_it_ended
 from mc_engine.safe_path import safe_environment
 from mc_engine.status import CRASHED, TIME_LIMIT
 
+_WORKER = "mc_engine.flight.case_worker"
 START_S = 600.0  # for `start`
+END_S = 5.0  # in which a process and all that it began should have ended by SIGHUP
 LOOK_EVERY_S = 0.2  # whether the run is to stop
 _idle: dict[tuple[Any, ...], list["CaseProcess"]] = {}
 _alive: set["CaseProcess"] = set()  # waiting or flying
@@ -73,7 +76,7 @@ class CaseProcess:
             raise ModelError(f"{setup.reference}: {fault}")
 
     def _start(self, descriptor: int) -> "subprocess.Popen[bytes]":
-        command = [sys.executable, "-m", "mc_engine.flight.case_worker", str(descriptor), str(self.work)]
+        command = [sys.executable, "-m", "mc_engine.process_tree", _WORKER, str(descriptor), str(self.work)]
         with open(self.work / STDOUT, "ab") as stdout, open(self.work / STDERR, "ab") as stderr:
             return subprocess.Popen(
                 [*command, str(os.getpid())],
@@ -133,6 +136,9 @@ class CaseProcess:
         shutil.rmtree(self.work, ignore_errors=True)
 
     def _kill(self) -> None:
+        with suppress(subprocess.TimeoutExpired):
+            self._process.send_signal(signal.SIGHUP)
+            self._process.wait(END_S if sys.platform.startswith("linux") else 0.0)  # elsewhere it has no guard
         for stop in (lambda: os.killpg(self._process.pid, signal.SIGKILL), self._process.kill):
             try:
                 stop()

@@ -362,7 +362,15 @@ def _prepare_process(work: Path, parent: int, memory_mib: float | None, of_progr
 
 
 def main(descriptor: int, work: Path, parent: int) -> None:
-    """Serve orders until the other end closes, or none comes for a while."""
+    """Serve orders until the other end closes, or none comes for a while; then nothing of its cases is left."""
+    try:
+        _serve(descriptor, work, parent)
+    finally:
+        end_children(set())
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def _serve(descriptor: int, work: Path, parent: int) -> None:
     import faulthandler
 
     faulthandler.enable()  # a crash in compiled code names the line of Python
@@ -389,12 +397,3 @@ def main(descriptor: int, work: Path, parent: int) -> None:
                 connection.send(f"{error.filename or work}: {error.strerror}")
             except StoreError as error:  # of the run directory
                 connection.send(error)
-
-
-if __name__ == "__main__":
-    _work = Path(sys.argv[2])
-    try:
-        main(int(sys.argv[1]), _work, int(sys.argv[3]))
-    finally:
-        end_children(set())
-        shutil.rmtree(_work, ignore_errors=True)

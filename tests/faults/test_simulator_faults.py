@@ -278,6 +278,25 @@ def test_children_left_behind_are_ended(tmp_path, faulty):
     assert running("4321") == []
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere a function ends its own programs")
+def test_a_killed_engine_leaves_neither_the_programs_of_a_function_nor_its_folder(tmp_path, monkeypatch):
+    fault = "import ctypes, subprocess\nsubprocess.Popen(['sleep', '4323'], start_new_session=True)\n"
+    file = python_campaign(tmp_path / "ball", cases=2, fault=f"{fault}ctypes.PyDLL(None).sleep(4323)")  # no thread runs
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
+    command = [sys.executable, "-m", "mc_engine", "run", file, "--out", tmp_path / "run", "--workers", "1"]
+    engine, end = subprocess.Popen(command), time.monotonic() + 60.0
+    while time.monotonic() < end and not running("sleep\0004323"):
+        time.sleep(0.05)
+    assert running("sleep\0004323")
+    engine.kill()
+    engine.wait()
+    while time.monotonic() < end and (running("sleep\0004323") or os.listdir(tmp_path / "temporary")):
+        time.sleep(0.05)
+    assert running("sleep\0004323") == []
+    assert os.listdir(tmp_path / "temporary") == []
+
+
 def more_kills():
     """Of a whole test, at random instants."""
     rng = np.random.default_rng(22)

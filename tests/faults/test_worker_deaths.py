@@ -233,7 +233,8 @@ def test_a_model_that_calls_exit_is_told_and_not_waited_for(tmp_path, backend):
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere a function ends its own programs")
 def test_a_time_limit_counts_the_flight_alone_and_leaves_neither_programs_nor_folders(tmp_path, monkeypatch):
-    fault = "if case.id == 1:\n    import subprocess\n    subprocess.run(['sleep', '4322'])"
+    fault = "if case.id == 1:\n    import subprocess\n"
+    fault += "    subprocess.Popen(['sleep', '4322'], start_new_session=True).wait()"
     file = python_campaign(
         tmp_path / "ball", cases=2, fault=fault, imports="import time", options="start=lambda: time.sleep(3.2),"
     )
