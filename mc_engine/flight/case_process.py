@@ -24,8 +24,8 @@ from typing import Any
 from mc_engine.errors import DiskError, ModelError, StoreError
 from mc_engine.flight.case_worker import STDERR, STDOUT, Order, Setup, end_of
 from mc_engine.flight.flyer import RunStopped
-from mc_engine.flight.program_flight import end_noted, last_lines
-from mc_engine.process_tree import how_it_ended
+from mc_engine.flight.program_flight import end_noted
+from mc_engine.process_tree import how_it_ended, last_lines
 from mc_engine.safe_path import safe_environment
 from mc_engine.status import CRASHED, TIME_LIMIT
 

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ import numpy as np
 from mc_engine.model.program import JSON_INPUT, template_environment
 from mc_engine.model.simulator import Simulator
 from mc_engine.numbers_in_text import counted, is_number
-from mc_engine.process_tree import end_children, how_it_ended, kill_group, memory_mib
+from mc_engine.process_tree import end_children, how_it_ended, kill_group, last_lines, memory_mib
 from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, NOT_FINITE, OK, STATUS_NAME, TIME_LIMIT
 from mc_engine.text import clean
 
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from mc_engine.flight.case_worker import Case
 
 PROGRAM_ID = "program_id"  # file with the process group of the program in flight, for whoever must end it
-TEMPLATE_S, TEMPLATE_MIB = 10.0, 2048  # that a template may take for one case
+BOUNDED_S, TEMPLATE_MIB = 10.0, 2048  # that a template or a pattern may take for one case
 LOOK_EVERY_S = 0.02  # between two looks at the memory of a program, and whether it has ended
 MOST_STDOUT, MOST_STDERR, MOST_RESULT = 2**24, 2**16, 2**26  # bytes
 _MIB = 2**20
@@ -223,12 +224,6 @@ def in_time(history: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return history
 
 
-def last_lines(stderr: bytes, count: int = 3) -> str:
-    """The last lines of what was written to stderr, to be put at the end of a sentence."""
-    lines = [line.strip() for line in stderr.decode(errors="replace").splitlines() if line.strip()]
-    return f": {' | '.join(lines[-count:])}" if lines else ""
-
-
 class TemplateFault(Exception):
     """A template that gives no text for a case."""
 
@@ -255,13 +250,13 @@ def _bounded() -> Iterator[None]:
     import resource
 
     def end(*_: Any) -> None:
-        raise TimeoutError(f"takes longer than {TEMPLATE_S:g} s")
+        raise TimeoutError(f"takes longer than {BOUNDED_S:g} s")
 
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
     most = TEMPLATE_MIB * _MIB if hard == resource.RLIM_INFINITY else min(TEMPLATE_MIB * _MIB, hard)
     before = signal.signal(signal.SIGALRM, end)
     resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
-    signal.setitimer(signal.ITIMER_REAL, TEMPLATE_S)
+    signal.setitimer(signal.ITIMER_REAL, BOUNDED_S)
     try:
         yield
     finally:
@@ -356,10 +351,14 @@ def _at(document: Any, path: str) -> Any:
 
 def _number(name: str, document: Any, path: str | None, pattern: str | None, stdout: str, sometimes: bool) -> float:
     if pattern is not None:
-        found = re.findall(pattern, stdout, re.MULTILINE)
+        try:
+            with _bounded():
+                found = deque(re.finditer(pattern, stdout, re.MULTILINE), 1)
+        except TimeoutError as fault:
+            raise ValueError(f'the search of stdout for "{pattern}", by which "{name}" is read, {fault}') from None
         if not found and not sometimes:
             raise ValueError(f'stdout has nothing like "{pattern}", by which "{name}" is read')
-        value: Any = found[-1] if found else "nan"
+        value: Any = found[0][1] or "" if found else "nan"
     else:
         assert path is not None  # one of them is given
         try:

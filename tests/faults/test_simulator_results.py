@@ -1,8 +1,11 @@
 """What simulators give that is no number and no history: such a case has no result, and the reason says why."""
 
+import re
+
 import pytest
 
 from mc_engine import load_campaign, run
+from mc_engine.flight import program_flight
 from tests.mc_engine.flight.falling_ball import python_campaign
 
 RESULTS = {
@@ -41,6 +44,13 @@ sigma = 0.5
     for row, (_, status, reason) in zip(table.to_dict("records"), RESULTS.values(), strict=True):
         assert row["status"] == status, row
         assert reason in row["reason"]
+
+
+def test_a_pattern_that_is_searched_for_too_long_gives_no_result(monkeypatch):
+    monkeypatch.setattr(program_flight, "BOUNDED_S", 0.2)
+    sentence = 'the search of stdout for "(a+)+$", by which "time_s" is read, takes longer than 0.2 s'
+    with pytest.raises(ValueError, match=re.escape(sentence)):
+        program_flight._number("time_s", None, None, "(a+)+$", 25 * "a" + "!", False)
 
 
 HISTORIES = {
