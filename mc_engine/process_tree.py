@@ -92,6 +92,15 @@ def end_children(keep: set[int]) -> None:
                 os.waitpid(pid, 0)
             except (ProcessLookupError, ChildProcessError):
                 continue
+        _forget_server(left)
+
+
+def _forget_server(ended: set[int]) -> None:
+    """Let `multiprocessing` start its fork server anew: it would wait for the one that it knows, and raise an error."""
+    server = getattr(sys.modules.get("multiprocessing.forkserver"), "_forkserver", None)
+    if server is not None and server._forkserver_pid in ended:
+        os.close(server._forkserver_alive_fd)
+        server._forkserver_pid = None
 
 
 def kill_group(pid: int) -> None:

@@ -27,6 +27,7 @@ from mc_engine.flight.flyer import NOMINAL_NOISE
 from mc_engine.flight.program_flight import Flown, ProgramFlight, flown, in_time, numeric
 from mc_engine.model.faults import fault_of
 from mc_engine.model.simulator import Refuse, Simulator, load_simulator
+from mc_engine.model.sources import leave_importable
 from mc_engine.process_tree import (
     adopt_orphans,
     die_with_parent,
@@ -42,7 +43,6 @@ from mc_engine.text import clean
 IDLE_S = 10.0  # without an order, after which the process ends and frees what `start` took
 STDOUT, STDERR = "stdout.txt", "stderr.txt"
 KEPT_BYTES = 2**16  # of each stream
-_LONGEST_REASON = 600  # characters
 _MIB = 2**20
 _STREAM, _SEED = "simulator.rng", "simulator.seed"  # names with a dot, which no dispersion has
 
@@ -131,7 +131,7 @@ class Worker:
 
     def __init__(self, setup: Setup, work: Path):
         self._seed, self._work = setup.seed, work
-        self._simulator = setup.simulator or _loaded(setup)
+        self._simulator = setup.simulator or _loaded(setup, work)
         self._shared, self._program, self._fly = None, None, self._simulator.fly
         if self._simulator.program is not None:
             self._program = ProgramFlight(self._simulator, work / "home")
@@ -206,11 +206,12 @@ class Worker:
             return _failed(error, self._simulator.reference)
 
 
-def _loaded(setup: Setup) -> Simulator:
+def _loaded(setup: Setup, work: Path) -> Simulator:
     """The simulator of a file or module; EngineError if it is another one than the run was begun with."""
     simulator = load_simulator(setup.reference, Path(setup.directory))
     if simulator.digest() != setup.digest:
         raise EngineError(f"{setup.reference}: was changed while its cases were flying; begin again")
+    leave_importable(simulator.sources, work / "modules")
     return simulator
 
 

@@ -89,6 +89,25 @@ def sources_of_file(path: Path) -> Sources:
     return _OF_FILES[name]
 
 
+_STUB = """from pathlib import Path
+from mc_engine.model.sources import sources_of_file
+sources_of_file(Path({file!r}))
+"""
+
+
+def leave_importable(sources: Sources | None, folder: Path) -> None:
+    """Let processes that this one spawns import a user's file and those beside it by the names that they have here.
+
+    folder : made for that, and put at the end of the import path, which the new processes take over.
+    """
+    if sources is None or not sources.module.__name__.startswith(USER):
+        return  # a module that is installed is found by them, too
+    folder.mkdir()
+    for name in [name for name in sys.modules if name.startswith(USER)]:
+        (folder / f"{name}.py").write_text(_STUB.format(file=str(sources.module.__file__)), encoding="utf-8")
+    sys.path.append(str(folder))
+
+
 def _data_in(folder: Path, sources: Mapping[Path, bytes]) -> dict[Path, bytes]:
     """Contents of the files that calls of `model` in these sources name as their data, and of those that their curves
     are read from; what cannot be read is left out."""

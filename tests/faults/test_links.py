@@ -206,6 +206,7 @@ ELSEWHERE = {
     "mc_engine/lanes/kernel_cache.py": "locks of kernels under compilation",
     "mc_engine/runner/backends.py": "what bench measured of cards, in the folder of compiled kernels",
     "mc_engine/store/object_store.py": "scratch folders beside a fetched copy",
+    "mc_engine/model/sources.py": "what spawned processes import, in a simulator's temporary folder",
     "mc_engine/process_tree.py": "a simulator's temporary folder, where its engine was killed",
     "mc_engine/text.py": "the null device",
     "mc_engine/command_line/watching.py": "the page of --watch, which is no run",

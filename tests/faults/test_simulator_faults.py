@@ -212,10 +212,12 @@ def test_what_a_function_does_to_its_process_ends_with_its_case(tmp_path, monkey
     assert json.loads(Path("run/simulator/case-0000001/case.json").read_text())["height_m"] == table["height_m"][1]
 
 
-def test_a_function_may_use_a_pool_of_processes(tmp_path):
-    fault = "import multiprocessing as many\nwith many.get_context('fork').Pool(2) as pool:\n    pool.map(abs, [1.0])"
-    file = python_campaign(tmp_path / "ball", cases=20, fault=fault, options="time_limit_s=5.0,")
-    assert run(load_campaign(file), tmp_path / "run", workers=1).status_counts() == {"ok": 20}
+@pytest.mark.parametrize(("kind", "cases"), [("fork", 20), ("spawn", 2), ("forkserver", 2)])
+def test_a_function_may_use_a_pool_of_processes(tmp_path, kind, cases):
+    fault = f"with many.get_context({kind!r}).Pool(1) as pool:\n    pool.map(twice, [1.0])"
+    imports = "import multiprocessing as many\ndef twice(x):\n    return 2.0 * x"
+    file = python_campaign(tmp_path / "ball", cases, fault, "time_limit_s=30.0,", imports)
+    assert run(load_campaign(file), tmp_path / "run", workers=1).status_counts() == {"ok": cases}
 
 
 def test_an_import_of_a_file_beside_that_comes_too_late_is_told_with_its_mend(tmp_path):
