@@ -98,7 +98,7 @@ input = { "case.txt" = "case.txt.j2" }
 result = "result.json"
 history = "history.csv"
 echo = "used"
-time_limit_s = 2.0
+time_limit_s = 60.0
 memory_limit_mib = 300
 title = "A falling ball with drag"
 [simulator.parameter]
@@ -122,7 +122,7 @@ def python_campaign(folder, cases=100, fault="", options="", imports=""):
     return folder / "campaign.toml"
 
 
-def program_campaign(folder, cases=100, fault="", mass="mass"):
+def program_campaign(folder, cases=100, fault="", mass="mass", limit_s=60.0):
     """A campaign of a C program, compiled in a new folder.  mass : what it says that it used."""
     folder.mkdir()
     (folder / "fall.c").write_text(C.replace("FAULT", fault).replace("MASS", mass))
@@ -130,7 +130,9 @@ def program_campaign(folder, cases=100, fault="", mass="mass"):
     subprocess.run([compiler, "-O1", "-o", folder / "fall", folder / "fall.c", "-lm"], check=True)
     names = " ".join(f"{{{{ {name} }}}}" for name in ("case_id", "mass_kg", "drag_area_m2", "height_m"))
     (folder / "case.txt.j2").write_text(names + "\n")
-    (folder / "campaign.toml").write_text(CAMPAIGN.format(flies="", cases=cases) + PROGRAM)
+    (folder / "campaign.toml").write_text(
+        CAMPAIGN.format(flies="", cases=cases) + PROGRAM.replace("60.0", f"{limit_s}")
+    )
     return folder / "campaign.toml"
 
 

@@ -131,7 +131,7 @@ def test_a_changed_simulator_is_another_one(tmp_path):
 MISTAKES = {
     "no program": ('["./fall"', '["./fal"', 'simulator.command: there is no program "./fal"'),
     "not on the path": ('["./fall"', '["falls-nowhere"', 'no program "falls-nowhere" on the PATH'),
-    "slots": ("time_limit_s = 2.0", "slots = 0", "simulator.slots: 0 is not allowed; it must be at least 1"),
+    "slots": ("time_limit_s = 60.0", "slots = 0", "simulator.slots: 0 is not allowed; it must be at least 1"),
     "unknown place": ("{folder}", "{foldr}", 'word 3: {foldr} is not known; did you mean "folder"?'),
     "never read": ('result = "result.json"', "", "is never read; give it a `pattern` over stdout"),
     "two things": ("[campaign]", '[campaign]\nsimulator = "sim.py"', "beside the table [simulator]"),
