@@ -70,7 +70,7 @@ class CaseProcess:
             self._connection.send(setup)
             fault = self._connection.recv() if self._connection.poll(START_S) else f"took longer than {START_S:.0f} s"
         except (EOFError, OSError):
-            fault = f"{how_it_ended(self._process.wait())}{last_lines(end_of(self.work / STDERR))}"
+            fault = f"{how_it_ended(self._process.wait())}{_crash_site(end_of(self.work / STDERR))}"
         if fault:
             self.end()
             raise ModelError(f"{setup.reference}: {fault}")

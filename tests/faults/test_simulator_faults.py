@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mc_engine import load_campaign, resume, run
+from mc_engine import ModelError, load_campaign, resume, run
 from tests.mc_engine.flight.falling_ball import program_campaign, python_campaign
 
 SAMPLE, WHOLE = (4, 50), (100, 250)  # cases with a fault, of so many: in the deep tests and in the slow ones
@@ -218,6 +218,14 @@ def test_what_a_function_does_to_its_process_ends_with_its_case(tmp_path, monkey
     refuse_others(table, (1, 3), "crashed", "ValueError: odd")
     assert table[::2].equals(sound[:4:2])
     assert json.loads(Path("run/simulator/case-0000001/case.json").read_text())["height_m"] == table["height_m"][1]
+
+
+def test_a_crash_of_start_is_told_with_its_place(tmp_path):
+    file = python_campaign(
+        tmp_path / "ball", cases=2, imports="import ctypes", options="start=lambda: ctypes.string_at(0),"
+    )
+    with pytest.raises(ModelError, match=r"^sim\.py: ended by SIGSEGV at __init__\.py, line \d+ in string_at$"):
+        run(load_campaign(file), tmp_path / "run", workers=1)
 
 
 @pytest.mark.parametrize(("kind", "cases"), [("fork", 20), ("spawn", 2), ("forkserver", 2)])
