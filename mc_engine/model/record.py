@@ -266,7 +266,7 @@ def _fault(reference: str, error: BaseException) -> str:
     if isinstance(error, SyntaxError):
         place = f"{Path(error.filename or reference).name}, line {error.lineno or 1}"
     if isinstance(error, SystemExit):
-        return f"{place}: ends the program; a model only defines MODEL"
+        return f"{place}: ends the program; it may only define MODEL or SIMULATOR"
     if isinstance(error, ModelError):
         return f"{place}: {error}"
     if isinstance(error, FileNotFoundError):

@@ -56,7 +56,7 @@ def test_a_model_imports_the_files_beside_it_and_sees_their_edits(tmp_path):
     ("helper", "sentence"),
     [
         ("TITLE = = 2\n", "helper.py, line 1: SyntaxError: invalid syntax"),
-        ("import sys\nsys.exit(3)\n", "helper.py, line 2: ends the program; a model only defines MODEL"),
+        ("import sys\nsys.exit(3)\n", "helper.py, line 2: ends the program; it may only define MODEL or SIMULATOR"),
         ("def f():\n    return 1 / 0\nTITLE = f()\n", "helper.py, line 2: ZeroDivisionError: division by zero"),
         ("import no_such_package\n", "helper.py, line 1: ModuleNotFoundError: No module named 'no_such_package'"),
     ],
