@@ -200,12 +200,12 @@ class ProgramFlight:
 
 
 def numeric(given: Any) -> Any:
-    """What was given; TypeError for text, truth values, dates and complex, which NumPy would take as numbers."""
+    """What was given, NaN where masked; TypeError for text, truth values, dates and complex, which NumPy would take."""
     kind = getattr(getattr(given, "dtype", None), "kind", "")
     items = np.ravel(given) if kind == "O" else given if isinstance(given, list | tuple) else [given]
     if kind in tuple("bSUmMc") or (kind in ("", "O") and any(isinstance(item, str | bytes | bool) for item in items)):
         raise TypeError
-    return given
+    return np.ma.filled(given.astype(np.float64), np.nan) if isinstance(given, np.ma.MaskedArray) else given
 
 
 def in_time(history: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

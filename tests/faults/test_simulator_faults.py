@@ -251,6 +251,14 @@ def test_text_and_truth_values_of_a_batch_are_no_numbers(tmp_path, given):
     refuse_others(table, (0, 1, 2, 3), "no-result", '"fall_time_s" is no array of numbers')
 
 
+def test_a_masked_element_of_a_batch_is_not_a_number(tmp_path):
+    time = "np.ma.masked_array(np.ones(case.id.size), case.id == 2)"
+    fault = f"if case.id.min() >= 0:\n    return {{'fall_time_s': {time}, 'impact_speed_m_s': {time}}}"
+    file = python_campaign(tmp_path / "ball", cases=4, fault=fault, options="batch=True,")
+    table = run(load_campaign(file), tmp_path / "run", workers=1).cases()
+    refuse_others(table, (2,), "not-finite", '"fall_time_s" is not a number')
+
+
 def test_a_case_of_a_batch_that_crashes_is_found(tmp_path, sound):
     fault = "if np.isin(case.id, (1, 6)).any():\n    import os\n    os.kill(os.getpid(), 9)"
     file = python_campaign(tmp_path / "ball", cases=8, fault=fault, options="batch=True,")
