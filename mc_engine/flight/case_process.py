@@ -136,9 +136,10 @@ class CaseProcess:
         shutil.rmtree(self.work, ignore_errors=True)
 
     def _kill(self) -> None:
-        with suppress(subprocess.TimeoutExpired):
-            self._process.send_signal(signal.SIGHUP)
-            self._process.wait(END_S if sys.platform.startswith("linux") else 0.0)  # elsewhere it has no guard
+        if sys.platform.startswith("linux"):  # elsewhere it has no guard
+            with suppress(subprocess.TimeoutExpired):
+                self._process.send_signal(signal.SIGHUP)
+                self._process.wait(END_S)
         for stop in (lambda: os.killpg(self._process.pid, signal.SIGKILL), self._process.kill):
             try:
                 stop()
