@@ -1,16 +1,17 @@
 """The interface of a worker pool, and the result of a task.  `mc_engine.runner.pools` has the implementations."""
 
+import ctypes
+import sys
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import Any
 
-import numpy as np
-
 from mc_engine.flight.chunks import Task
 from mc_engine.store.parts import Written
 
-_LARGEST_KEPT = 31 * 2**20  # bytes; glibc raises its limits for blocks of up to 32 MiB
+_LARGEST_KEPT = 31 * 2**20  # bytes; glibc's limit is below 32 MiB
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of malloc.h
 
 
 @dataclass(frozen=True)
@@ -67,10 +68,14 @@ def keep_freed_memory() -> None:
     """Have this process keep the memory of freed arrays for the arrays of the next chunk.
 
     glibc gives the memory of arrays of more than 128 KiB back to the system when they are freed, so that each page of
-    the next array is a page fault, for which all threads wait in turn.  It raises that limit to the largest block that
-    was freed so far: mallopt(3), M_MMAP_THRESHOLD.  Without effect on other systems.
+    the next array is a page fault, for which all threads wait in turn; with MALLOC_TRIM_THRESHOLD_, which Dask sets for
+    its workers, that of smaller ones, too.  See mallopt(3).  Without effect on other systems.
     """
-    np.empty(_LARGEST_KEPT, dtype=np.uint8)
+    if not sys.platform.startswith("linux"):
+        return
+    if (limit := getattr(ctypes.CDLL(None), "mallopt", None)) is not None:
+        limit(_M_MMAP_THRESHOLD, _LARGEST_KEPT)
+        limit(_M_TRIM_THRESHOLD, 2 * _LARGEST_KEPT)
 
 
 def result_of(task: Task, future: Any, deaths: type[Exception]) -> Result:
