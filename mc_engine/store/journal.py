@@ -21,6 +21,7 @@ from mc_engine.shell_words import shell_word
 PUT_BACK = "put the original back, or fetch a copy of the run"
 _TAIL = re.compile(rb',"crc":"([0-9a-f]{8})"}')
 _TAIL_LENGTH = len(b',"crc":"00000000"}')
+_PAGE = 4096  # bytes that systems hand to the disk together
 _SHORTEST = len(b'{"n":1,"at":"","event":"","crc":"00000000"}')  # bytes of a line
 
 
@@ -123,12 +124,21 @@ class Journal:
         self._length, self._size = lines.length, len(content)  # up to the last valid line, and in all
 
     def append(self, event: str, *facts: dict[str, Any]) -> list[Entry]:
-        """Write lines of one event and sync them.  After an error they are not valid, and may be appended again."""
-        number, at = len(self.entries) + 1, utc_now()
-        lines = [encode(number + i, at, event, one) for i, one in enumerate(facts)]
-        entries = [entry for line in lines if (entry := decode(line[:-1]))]
-        assert len(entries) == len(lines)  # just encoded
-        content = b"".join(lines)
+        """Write a line of an event and sync it, or several: as many of the first of `facts` as lie in the same page.
+
+        Of several pages a power cut may leave a later one alone, and that would be damage.  After an error the lines
+        are not valid, and may be appended again.
+        """
+        number, at, content = len(self.entries) + 1, utc_now(), b""
+        entries: list[Entry] = []
+        for one in facts:
+            line = encode(number + len(entries), at, event, one)
+            if entries and self._length % _PAGE + len(content) + len(line) > _PAGE:
+                break
+            entry = decode(line[:-1])
+            assert entry is not None  # just encoded
+            content += line
+            entries.append(entry)
         if self.certain and os.path.getsize(self.path) != self._size:
             raise StoreError(f"{self.path}: another process has written here; this process stops and writes nothing")
         self.certain = False

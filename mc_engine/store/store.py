@@ -142,8 +142,11 @@ class Store:
 
     def _record(self, event: str, *facts: dict[str, Any]) -> None:
         self._lock.check()
-        for entry in self._journal.append(event, *facts):
-            self._counted.take(entry)
+        while facts:
+            entries = self._journal.append(event, *facts)
+            for entry in entries:
+                self._counted.take(entry)
+            facts = facts[len(entries) :]
 
     @property
     def campaign_text(self) -> str:

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mc_engine.durable_file import append_synced
 from mc_engine.errors import StoreError
 from mc_engine.store.journal import Journal, decode, encode, scan
 
@@ -88,6 +89,22 @@ def test_an_appended_line_is_there_for_the_next_reader(path):
     assert again.entries[-1].event == "finished"
     assert again.entries[-1].facts == {"seconds": 2.5}
     assert again.entries == journal.entries
+
+
+def test_lines_of_one_event_are_written_together_but_for_those_of_another_page(path, monkeypatch):
+    journal, written = Journal(path), []
+    monkeypatch.setattr(
+        "mc_engine.store.journal.append_synced",
+        lambda root, name, at, content: (written.append((at, content)), append_synced(root, name, at, content)),
+    )
+    facts = [{"file": "x" * 150, "first": number} for number in range(100)]
+    left = facts
+    while left:
+        left = left[len(journal.append("part", *left)) :]
+    assert [entry.facts for entry in Journal(path).entries[4:]] == facts
+    assert len(written) < 20
+    for at, content in written:
+        assert content.count(b"\n") == 1 or at // 4096 == (at + len(content) - 1) // 4096
 
 
 # shorter and longer than the new line; and with a newline that was on the disk before the bytes in front of it
