@@ -92,7 +92,8 @@ def test_a_comparison_states_its_intervals_with_the_confidence_of_the_second_run
     for confidence in (0.9, 0.99):
         runs[1].manifest["report"] = {"probability": 0.9973, "confidence": confidence}
         compared = compare_runs(
-            *(SimpleNamespace(manifest=run.manifest, campaign_text="", cases=run.cases) for run in runs), ("a", "b")
+            *(SimpleNamespace(manifest=run.manifest, campaign_text="", cases=run.cases, n_cases=400) for run in runs),
+            ("a", "b"),
         )
         force = next(one.shift for one in compared.metrics if one.metric == "peak_force_n")
         reach.append(force.upper - force.lower)
