@@ -167,8 +167,9 @@ def in_threads(work: Callable[[S], T], items: Sequence[S], workers: int = 1) -> 
             done, waiting = wait(outcomes, _LOOK_EVERY_S, FIRST_EXCEPTION)  # Windows handles no signal in one long wait
             if failed := [outcome for outcome in done if outcome.exception() is not None]:
                 queue.clear()
-                while any(thread.is_alive() for thread in threads):
-                    time.sleep(_LOOK_EVERY_S / 20)
+                for thread in threads:
+                    while thread.is_alive():
+                        thread.join(_LOOK_EVERY_S)
                 failed[0].result()
             if not waiting:
                 return [outcome.result() for outcome in outcomes]

@@ -48,8 +48,8 @@ def prepare(model: Model, inputs: Inputs, n_cases: int) -> Prepared:
         if not _all_fit(parameter, given):
             _refuse_unfit(parameter, np.broadcast_to(given, n_cases), refusals)
         column = given * parameter.si_factor
-        alike = model.prepare is not None and column.shape != (n_cases,)  # the kernel takes one number for all cases
-        setattr(si, parameter.symbol, np.full(n_cases, column) if alike else column)
+        repeat = model.prepare is not None and column.shape != (n_cases,)  # else one number may count for all cases
+        setattr(si, parameter.symbol, np.full(n_cases, column) if repeat else column)
     settings = np.zeros((n_cases, max(1, len(model.settings))))
     for i, setting in enumerate(model.settings):
         settings[:, i] = _setting_codes(setting, inputs[setting.name])

@@ -307,7 +307,7 @@ class Store:
     def publish(self, *written: Written) -> None:
         """Commit parts that workers wrote by `parts.write_aside`; on return they survive a power cut.
 
-        The disk is waited for as long for many as for one.
+        The disk is waited for once for the names of all, and once for the journal lines of a page.
         """
         with self.lock():
             if written[0].part.file == NOMINAL:

@@ -40,7 +40,8 @@ _TIGHT = 1e-13
 _TOLERANCES = tuple(10.0 ** (-k / 4) for k in range(16, 53))
 # steps are tried so many quarters of an octave longer than the model's own, and so many shorter
 _LONGER, _SHORTER = 28, 8
-# of a model that chooses its steps so many around this part of the longest flight; so many such flights are no limit
+# of a model that chooses its steps: so many quarters around this part of its longest flight; a time limit beyond so
+# many of these flights counts as none
 _PART, _AROUND, _NO_LIMIT = 1 / 512, 24, 1e4
 _ROUNDING = 1e-14  # no error of a metric is told apart from zero below
 _ROUNDED = 1e-12  # of the largest number of the same quantity: a metric below is but its rounding
