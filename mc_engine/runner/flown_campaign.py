@@ -30,7 +30,7 @@ def campaign_of(store: "Store", directory: Path | None = None) -> Campaign:
     """
     from mc_engine.campaign.sensitivity_design import companion
     from mc_engine.campaign.upstream import COMPANION
-    from mc_engine.runner.manifest import columns_of, sampling_digest
+    from mc_engine.runner.manifest import columns_of, engine_version, sampling_digest
     from mc_engine.sampling.designs import EXTENSIBLE
     from mc_engine.sampling.streams import SEED_CONTRACT
     from mc_engine.store.parts import CASE_COLUMNS
@@ -61,8 +61,15 @@ def campaign_of(store: "Store", directory: Path | None = None) -> Campaign:
         raise StoreError(f"{store.path}: a file of the campaign was edited; run the campaign anew")
     ours = flyer_of(campaign).digest(), sampling_digest(), SEED_CONTRACT
     if ours != flown_by or (*CASE_COLUMNS, *columns_of(campaign)) != store.columns:
-        raise StoreError(f"{store.path}: was flown by other sources of engine or model; run the campaign anew")
+        raise StoreError(f"{store.path}: {_other_sources(store.manifest.get('engine'), engine_version())}")
     return campaign
+
+
+def _other_sources(flown: str | None, present: str) -> str:
+    """Why a run of other sources is refused, and the remedy.  flown, present : versions of the engine."""
+    if flown in (None, present):
+        return "was flown by other sources of engine or model; run the campaign anew"
+    return f"was flown by mc-engine {flown}, and this is {present}; use that version, or run the campaign anew"
 
 
 def companions_of(campaign: Campaign) -> dict[str, bytes]:

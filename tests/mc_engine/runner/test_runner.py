@@ -166,6 +166,14 @@ def test_a_run_of_other_sources_is_neither_continued_nor_replayed(flown, monkeyp
     assert damage(flown.path) == []
 
 
+def test_the_version_that_flew_a_run_is_named(flown, monkeypatch):
+    monkeypatch.setattr(manifest, "sampling_digest", lambda: "another")
+    monkeypatch.setattr(manifest, "engine_version", lambda: "9.1")
+    present = flown.manifest["engine"]
+    with pytest.raises(StoreError, match=f"was flown by mc-engine {present}, and this is 9.1; use that version"):
+        runner.resume(flown.path)
+
+
 @pytest.mark.parametrize("folder", ["sampling", "campaign"])
 def test_the_sources_that_draw_inputs_are_in_the_digest_of_sampling(tmp_path, monkeypatch, folder):
     engine = Path(manifest.__file__).parents[1]
