@@ -146,4 +146,8 @@ def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE"
                 raise type(error)(why) from error
             typer.echo(why, err=True)
     if not flight.equal:
-        leave(DAMAGED, f"case {case} is not the one in {folder}: the run was changed, or flown by other sources")
+        from mc_engine.studies.run_changes import changed_lines, machine_changes
+
+        others = "; ".join(changed_lines(machine_changes(store.manifest)))
+        why = f"it is of another machine ({others})" if others else "its results depend on more than its inputs"
+        leave(DAMAGED, f"case {case} is not the one in {folder}: the run was changed, or {why}")

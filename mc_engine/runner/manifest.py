@@ -21,7 +21,7 @@ from mc_engine.status import STATUS_NAME, STATUS_TEXT
 from mc_engine.store.journal import utc_now
 from mc_engine.store.parts import Column
 
-PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "pandas", "pyarrow", "joblib", "pydantic")
+PACKAGES = ("numpy", "scipy", "pyerfa", "numba", "llvmlite", "pandas", "pyarrow", "joblib", "pydantic")
 
 
 def sampling_digest() -> str:

@@ -268,7 +268,7 @@ def replay(path: str | Path, case_id: int) -> Replay:
     again = {**table, **flight}
     differences = [
         f"case {case_id}, {name}: stored {stored[name]!r}, now {value!r}"
-        for name, value in ((name, column[0]) for name, column in again.items())
+        for name, value in ((name, np.asarray(column).tolist()[0]) for name, column in again.items())
         if flyer.differs(stored[name], value)
     ]
     lost = flyer.lost_number(inputs, noise, flight, f"case {case_id}")

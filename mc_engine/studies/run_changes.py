@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from difflib import unified_diff
 from typing import Any
 
+from mc_engine.runner.manifest import environment
+
 SHOWN_OF_A_DIGEST = 12
 
 
@@ -25,6 +27,13 @@ def code_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Differ
 def campaign_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Difference, ...]:
     """Design, seed, number of cases, dispersions, parameters, settings and requirements, of two manifests."""
     return _differences(_campaign_facts(a), _campaign_facts(b))
+
+
+def machine_changes(manifest: Mapping[str, Any]) -> tuple[Difference, ...]:
+    """In what the processor and packages at hand differ from those that a run names."""
+    flown = {what: fact for what, fact in _machine_facts(manifest.get("provenance", {})).items() if fact}
+    present = _machine_facts(environment())
+    return _differences(flown, {what: present[what] for what in flown if what in present})
 
 
 def campaign_diff(a: str, b: str) -> tuple[str, ...]:
@@ -51,8 +60,11 @@ def _code_facts(manifest: Mapping[str, Any]) -> dict[str, str]:
         "seed contract": str(manifest.get("seed_contract", "")),
         "git": _git(made.get("git")),
     }
-    for key in ("python", "platform", "cpu", "numba", "llvm"):
-        facts[key] = str(made.get(key, ""))
+    return {**facts, **_machine_facts(made)}
+
+
+def _machine_facts(made: Mapping[str, Any]) -> dict[str, str]:
+    facts = {key: str(made.get(key, "")) for key in ("python", "platform", "cpu", "llvm")}
     packages = made.get("packages", {})
     return {**facts, **{f"package {name}": str(version) for name, version in packages.items()}}
 

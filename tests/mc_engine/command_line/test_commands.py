@@ -15,7 +15,8 @@ from mc_engine.command_line.next_step import after_flight
 from mc_engine.errors import ModelError, RunInterrupted, StoreError
 from mc_engine.store.opening import open_store
 from mc_engine.store.verification import damage
-from tests.mc_engine.store.small_run import block
+from mc_engine.studies import run_changes
+from tests.mc_engine.store.small_run import MANIFEST, block
 
 
 @pytest.fixture
@@ -293,6 +294,19 @@ def test_replay_of_a_case_with_other_bits_names_them_and_exits_with_5(here, call
     small_store(here / "flown")
     calls.equal = False
     fails_with(5, call("replay", "flown", 17), "propellant_kg: 1 is not 2", "case 17 is not the one in flown")
+
+
+def test_replay_of_a_case_with_other_bits_names_the_machine_if_it_is_another(here, calls, monkeypatch):
+    calls.equal = False
+    monkeypatch.setitem(MANIFEST, "provenance", {"cpu": "znver3", "packages": {"numpy": "2.0.0"}})
+    small_store(here / "flown")
+    now = {"cpu": "znver4", "python": "3.13.0", "packages": {"numpy": "2.0.0", "pyerfa": "2.0.1.5"}}
+    monkeypatch.setattr(run_changes, "environment", lambda: now)
+    fails_with(
+        5, call("replay", "flown", 17), "the run was changed, or it is of another machine (cpu: znver3 -> znver4)"
+    )
+    monkeypatch.setattr(run_changes, "environment", lambda: {**now, "cpu": "znver3"})
+    fails_with(5, call("replay", "flown", 17), "or its results depend on more than its inputs")
 
 
 # ---- after flying
