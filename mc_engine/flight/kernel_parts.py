@@ -17,15 +17,15 @@ from mc_engine.model.phases import PHASE, at_first, noted_field, record_class
 from mc_engine.model.reading import ARGUMENTS
 from mc_engine.model.record import Model, NoMemory
 
-# The physics of a model, and intrinsics that pick or fill fields of tuples:
+# The physics of a model; whether the phase of a case is sampled, and intrinsics that pick or fill fields of tuples:
 # peaks_of, lasts_of : from the outputs, the values of which peaks and last times above zero are wanted
 # best_of, when_of : the model's extrema, from what the loop tracked;  smooth_of, kinds_of, signs_of : constants
 # states_of, metrics_of : refuse to be compiled for another number of fields than the model declares
 # stops_of, switches_of, notes_of : whether an event fired that ends the case, that calls `switch`, that calls `note`
 Functions = namedtuple(
     "Functions",
-    "initial start rhs control events switch note observe evaluate peaks_of lasts_of best_of when_of smooth_of "
-    "kinds_of signs_of stops_of switches_of notes_of states_of metrics_of",
+    "initial start rhs control events switch note observe evaluate samples peaks_of lasts_of best_of when_of "
+    "smooth_of kinds_of signs_of stops_of switches_of notes_of states_of metrics_of",
 )
 PHYSICS = Functions._fields[:9]
 NoEvents = namedtuple("NoEvents", "unused")
@@ -39,6 +39,11 @@ def _no_start(p, o):
 @physics
 def _no_control(t, s, m, p, o, draws):
     return m
+
+
+@physics
+def _always(t, s, m, p, o):
+    return 1.0
 
 
 @physics
@@ -104,6 +109,7 @@ def functions_of(model: Model, makers: Any = None) -> Functions:
         model.note or _no_note,
         _with_phase(model, "observe"),
         _with_phase(model, "evaluate"),
+        model.samples or _always,
     )
     return Functions(*(made_by(function, makers) for function in physics_of_model), *_picks(model, makers))
 
@@ -218,6 +224,7 @@ def watching_events(model: Model) -> Model:
         start=_starting(model.start, memory, len(times)),
         rhs=_of_own("rhs", model.rhs),
         control=model.control and _of_own("control", model.control, memory, kept),
+        samples=model.samples and _of_own("rhs", model.samples),
         events=events,
         switch=model.switch and _switching(model.switch, memory, kept),
         note=_noting(model.note, memory, names),

@@ -208,6 +208,13 @@ def _changed(f, key, case, sample, here, fired, switching, sampling, p, o):
 changed = compile_inline(_changed)
 
 
+@physics
+def _next_sample(t, sample, period):
+    """Number of the first sample that is not before t, and not before that one."""
+    number = floor(t / period)
+    return maximum(sample, where(number * period < t, number + 1.0, number))
+
+
 def _fly(
     f,
     tables,
@@ -256,7 +263,7 @@ def _fly(
     bracket = Bracket(zero, zero, armed, armed, armed, armed, zero, zero, zero, zero)
     best, when = here.values, map_fields(first_time, here.values, zero)
     due, rows_of_step = zero, load(pace, 0, width)
-    flying, trial, length, error = active > 0.5, zero, zero, zero  # of an attempt: there is none before the first round
+    flying, sampled, trial, length, error = active > 0.5, closing, zero, zero, zero  # of an attempt: there is none yet
     while True:
         starting = any_lane(new | altered)
         if starting:
@@ -276,7 +283,8 @@ def _fly(
             t_end, end = here.t, here.s
         else:
             flying = active > 0.5
-            target = minimum(clock.until + zero, sample * clock.period)
+            sampled = zero + f.samples(here.t, here.s, here.m, p, o) > 0.5
+            target = minimum(clock.until + zero, where(sampled, sample * clock.period, _NEVER))
             room = target - here.t
             length = minimum(where(room <= 1.001 * h, room, h), limit)
             landing = (not closing) & (length == room)
@@ -351,6 +359,8 @@ def _fly(
         if any_lane(noting):
             m = noted(f, here, fired, noting, p, o)
             here = Instant(here.t, here.s, m, here.k, here.senses, here.rates, here.values)
+        if any_lane(arrived & (not sampled)):
+            sample = where(sampled, sample, _next_sample(here.t, sample, clock.period))
         sampling = arrived & (not ended) & (here.t >= sample * clock.period)
         switching = closed & (not ended) & f.switches_of(fired)
         altered = sampling | switching

@@ -147,6 +147,7 @@ def model(
         start=kept.start(start) if kept.kept else start,
         rhs=kept.rhs(derivatives) if phases else derivatives[0],
         control=kept.control(controls) if kept.kept else controls[0],
+        samples=kept.samples(controls),
         events=kept.watched(calls) if calls else None,
         switch=kept.switch(switch) if kept.kept else switch,
         note=kept.note(seen, outputs._fields),

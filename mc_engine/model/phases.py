@@ -54,6 +54,11 @@ def _flag(number, wanted):
 
 
 @physics
+def _flag_of_either(before, number, wanted):
+    return where(number == wanted, 1.0, before)
+
+
+@physics
 def _due(due, crossing, acted, t, after):
     """Time at which the action is due; a crossing while it is being waited for changes nothing."""
     due = where(acted > 0.5, NEVER, due)
@@ -138,6 +143,20 @@ class Memory:
             return None
         made = [_as_it_is if function is None else self._kept_by(function) for function in functions]
         return Alternatives(("argument", _MEMORY, PHASE), made) if self.phases else made[0]
+
+    def samples(self, functions: Sequence[Any]) -> ComposedFunction | None:
+        """1.0 in the phases that have a control, 0.0 in the others; None where all have one, or none.
+
+        functions : the controls, None for a phase without.
+        """
+        if all(functions) or not any(functions):
+            return None
+        calls: list[Call] = []
+        flag: Pick = ("constant", 0.0, "")
+        for k in (k for k, function in enumerate(functions) if function is not None):
+            calls.append((_flag_of_either, (flag, ("argument", _MEMORY, PHASE), ("constant", float(k), ""))))
+            flag = ("result", len(calls) - 1, "")
+        return ComposedFunction(calls)
 
     def _kept_by(self, function: Any) -> ComposedFunction:
         picks: list[Pick] = [("result", 0, name) for name in self._own_fields]

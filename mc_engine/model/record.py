@@ -67,6 +67,7 @@ class Model:
     prepare(inputs, settings, refusals) : dict of kernel parameters, see `model`
     start(p, o) : the first discrete state
     control(t, s, m, p, o, draws) : the next discrete state, at each sample, the first at t = 0
+    samples(t, s, m, p, o) : 1.0 in a phase with samples, 0.0 in one without; by default there are samples throughout
     events(t, s, m, p, o) : named tuple with one component for each Event
     switch(t, s, m, p, o, hit) : (state, discrete state) after an event with the action "switch"; hit has 1.0 where it
         fired
@@ -105,6 +106,7 @@ class Model:
     prepare: Callable[..., Any] | None = None
     start: Callable[..., Any] | None = None
     control: Callable[..., Any] | None = None
+    samples: Callable[..., Any] | None = None
     events: Callable[..., Any] | None = None
     switch: Callable[..., Any] | None = None
     note: Callable[..., Any] | None = None

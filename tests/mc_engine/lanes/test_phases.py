@@ -2,6 +2,7 @@
 
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from mc_engine.flight.flight import bound_flight, fly_history, fly_interpreted
 from mc_engine.flight.interpreted import InterpretedFlight
-from mc_engine.model import load_model
+from mc_engine.model import FixedStep, load_model
 
 ROCKETS = {name: load_model(f"{name}.py", FOLDER) for name in ("phased_rocket", "phased_rocket_adaptive")}
 N_CASES = 37  # no whole number of vectors
@@ -84,6 +85,20 @@ def test_control_is_sampled_in_its_own_phase_alone(inputs, whole):
     exits = exit_speed / (inputs["thrust_m_s2"] - GRAVITY)  # v = a t on the rail
     samples = np.floor(inputs["burn_s"] / 0.5) - np.floor(exits / 0.5)
     np.testing.assert_array_equal(whole["samples"], samples)
+
+
+def test_a_phase_without_control_is_flown_in_long_steps_between_the_same_samples():
+    """Adaptive steps, 200 attempts at most, beside those of the grid of the samples: an hour's coast has 36,000."""
+    coasting = load_model("long_coast.py", FOLDER)
+    gridded = replace(coasting, clock=FixedStep(step=0.1, until=10_000.0))
+    wakes = np.random.default_rng(3).uniform(3000.0, 4000.0, N_CASES)
+    ours, theirs = (flown(model, wake_s=wakes) for model in (coasting, gridded))
+    assert set(ours["status"]) == {"ok"}
+    np.testing.assert_array_equal(ours["samples"], 51 + np.floor((wakes + 5.03) / 0.1) - np.floor(wakes / 0.1))
+    np.testing.assert_allclose(ours["first_s"], 0.1 * np.ceil(wakes / 0.1), rtol=1e-14)
+    for name in ("samples", "noise"):
+        np.testing.assert_array_equal(ours[name], theirs[name])
+    same_bytes(ours, flown(coasting, width=1, wake_s=wakes))
 
 
 @pytest.mark.parametrize(
