@@ -149,9 +149,8 @@ def _check_nothing_missing(stores: Sequence[Store]) -> None:
     missing = gaps([piece for store in stores for piece in store.committed()], range(stores[0].n_cases))
     if not missing:
         return
-    commands = {store.path: f"mc-engine resume {shell_word(store.path)}" for store in stores if store.missing()}
-    unfinished = [_within(missing, store.wanted) for store in stores if store.missing()]
-    lines = [f"`{command}`" for command, there in zip(commands.values(), unfinished, strict=True) if there]
+    unfinished = dict.fromkeys(store.path for store in stores if store.missing() and _within(missing, store.wanted))
+    lines = [f"`mc-engine resume {shell_word(path)}`" for path in unfinished]
     lines += _commands_of_absent(stores, missing)
     cases = ", ".join(f"{first} to {stop - 1}" for first, stop in missing)
     raise UsageError(f"cases {cases} are missing; fly them with " + ", ".join(lines))

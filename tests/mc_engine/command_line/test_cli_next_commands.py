@@ -79,7 +79,10 @@ def test_what_cannot_be_asked_of_sound_folders_and_urls_is_wrong_usage_and_no_da
         (["status", f"{url}/nowhere"], "nowhere: holds no run"),
         (["fetch", f"{url}/copy", "a"], "a: is not empty; choose another folder"),
         (["merge", "whole", "a", "other"], "other: is not of the campaign of a"),
-        (["merge", "whole", "begun"], "cases 0 to 39 are missing; fly them with `mc-engine resume begun`"),
+        *(
+            (["merge", "whole", *runs], "cases 0 to 39 are missing; fly them with `mc-engine resume begun`")
+            for runs in (["begun"], ["begun", "begun"])
+        ),
         *(
             ([verb, *words], "imported: its results were imported from results.csv")
             for verb, *words in (["resume", "imported"], ["resume", "imported", "--repair"], ["replay", "imported", 3],
