@@ -108,24 +108,18 @@ class Receipts:
     """The committed files after the journal lines taken so far.
 
     parts : receipts of the parts of cases, by their first case, without overlap.
-    begun_with : number of cases in the manifest, if known.  nominal, histories : their receipts, or None.
+    nominal, histories : their receipts, or None.  extended : number of cases by the last extension, or None.
     """
 
-    def __init__(self, begun_with: int | None = None):
+    def __init__(self) -> None:
         self.parts: list[Part] = []
-        self.begun_with = self._asked = begun_with
         self.nominal: Part | None = None
         self.histories: Part | None = None
+        self.extended: int | None = None
 
-    def begin_with(self, cases: int) -> None:
-        """Set the number of cases in the manifest, if the lines were taken before that was read."""
-        self.begun_with, self._asked = cases, self._asked or cases
-
-    @property
-    def cases(self) -> int | None:
-        """Number of cases of the run, from the manifest or the last extension; at least those of the last part."""
-        flown = self.parts[-1].stop if self.parts else 0
-        return None if self._asked is None else max(self._asked, flown)
+    def cases(self, begun_with: int) -> int:
+        """Number of cases of the run, which began with so many; at least those of the last part."""
+        return max(self.extended or begun_with, self.parts[-1].stop if self.parts else 0)
 
     def take(self, entry: Entry) -> None:
         """Apply one more line; ValueError with a sentence, without any change, if the line is not valid."""
@@ -144,7 +138,7 @@ class Receipts:
         elif entry.event == "history":
             self.histories = _part(record)
         elif entry.event == "extended":
-            self._asked = record.cases
+            self.extended = record.cases
 
     def _count(self, part: Part) -> None:
         """Add a part, in place of parts with any of its cases: one is being replaced, or its withdrawal was lost."""
@@ -190,12 +184,9 @@ def gaps(ranges: Iterable[Range], expected: range) -> list[Range]:
     return between
 
 
-def receipts_of(entries: Iterable[Entry], begun_with: int | None = None) -> tuple[Receipts, dict[int, str]]:
-    """The committed files after all valid lines, and by line number what is wrong with the others.
-
-    begun_with : number of cases in the manifest, if that can be read.
-    """
-    counted, wrong = Receipts(begun_with), {}
+def receipts_of(entries: Iterable[Entry]) -> tuple[Receipts, dict[int, str]]:
+    """The committed files after all valid lines, and by line number what is wrong with the others."""
+    counted, wrong = Receipts(), {}
     for entry in entries:
         try:
             counted.take(entry)

@@ -28,7 +28,7 @@ from mc_engine.store.histories import history_columns, history_table, read_histo
 from mc_engine.store.journal import PUT_BACK, Entry, Journal, damaged_line, encode, utc_now
 from mc_engine.store.manifest_file import cases_in, columns_in, edited_files, manifest_bytes, parse_manifest
 from mc_engine.store.parts import CASE_COLUMNS, PART_FOLDERS, Column, Part, Written, is_part_file
-from mc_engine.store.receipts import Range, Receipts, receipts_of
+from mc_engine.store.receipts import Range, receipts_of
 from mc_engine.store.run_files import CAMPAIGN, CUT_SHORT, JOURNAL, MANIFEST, NO_FOLDER, NOMINAL, is_run_directory
 from mc_engine.store.writer_lock import LOCK_FILES, LOCK_NAME, WriterLock, writer_of_new
 
@@ -108,14 +108,12 @@ class Store:
         if not is_run_directory(path):
             raise StoreError(f"{path}: is no run directory" if path.exists() else f"{path}: there is no such folder")
         self._lock = WriterLock(path)
-        self._counted = Receipts()
         self._read_journal()
         try:
             self.manifest = parse_manifest(self._original(MANIFEST, "manifest"))
         except ValueError as error:
             raise StoreError(f"{path / MANIFEST}: {error}") from None
         self.columns = columns_in(self.manifest)
-        self._counted.begin_with(self.manifest["campaign"]["cases"])
 
     def __repr__(self) -> str:
         return f"Store({str(self.path)!r})"
@@ -135,7 +133,7 @@ class Store:
         self._journal = Journal(self.path / JOURNAL)
         if not self._journal.entries or self._journal.entries[0].event != "created":
             raise damaged_line(self.path / JOURNAL, 1, 'it is not the event "created"')
-        self._counted, wrong = receipts_of(self._journal.entries, self._counted.begun_with)
+        self._counted, wrong = receipts_of(self._journal.entries)
         for number, why in wrong.items():
             raise damaged_line(self.path / JOURNAL, number, why)
         self._created = self._journal.entries[0].facts
@@ -185,7 +183,7 @@ class Store:
     @property
     def n_cases(self) -> int:
         """Number of cases of the run, after all extensions."""
-        return int(self._counted.cases or self.manifest["campaign"]["cases"])
+        return self._counted.cases(self.manifest["campaign"]["cases"])
 
     @property
     def wanted(self) -> range:

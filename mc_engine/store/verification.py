@@ -125,10 +125,10 @@ def _run_damages(run: Path) -> tuple[list[Damage], Collection[str]]:
         journal = scan(read_journal(run / JOURNAL))
     except StoreError as error:
         return [Damage(_without_folder(run, error), ORIGINAL)], ()
-    heads = list(_head_problems(run, journal))
-    begun, problems = _begun_with(journal), [Damage(text, UPDATE if NEWER in text else ORIGINAL) for text in heads]
+    begun = _begun_with(journal)
+    problems = [Damage(text, UPDATE if NEWER in text else ORIGINAL) for text in _head_problems(run, begun)]
     manifest = None if problems else parse_manifest(read_short(run / MANIFEST))
-    counted, wrong = receipts_of(journal.entries, None if manifest is None else manifest["campaign"]["cases"])
+    counted, wrong = receipts_of(journal.entries)
     killed = not busy and is_left_by_dead(run) and not (journal.damaged or wrong)
     remedy = RESUME if killed else REPAIR  # where a line is damaged, a part without a line may be that line's
     problems += _line_problems(journal, wrong, busy, remedy)
@@ -161,9 +161,8 @@ def _begun_with(journal: Scan) -> dict[str, str]:
     return {MANIFEST: created["manifest"], CAMPAIGN: created["campaign"], **created.get("companions", {})}
 
 
-def _head_problems(run: Path, journal: Scan) -> Iterator[str]:
+def _head_problems(run: Path, begun: dict[str, str]) -> Iterator[str]:
     """Damage of manifest, campaign file and companions, by the digests in the journal's first line."""
-    begun = _begun_with(journal)
     if not begun:
         yield f"{JOURNAL}: its first line, the creation, is lost; {MANIFEST} and {CAMPAIGN} cannot be verified"
         return
@@ -236,9 +235,9 @@ def _unrecorded(run: Path, present: list[str], counted: Receipts, remedy: str) -
 def _unfinished(journal: Scan, counted: Receipts, manifest: dict[str, Any] | None, remedy: str) -> Iterator[Damage]:
     """A run that has all its cases, but no line "finished" or "interrupted" of its last session."""
     events = [entry.event for entry in journal.entries if entry.event in _SESSION]
-    if manifest is None or counted.cases is None or not events or events[-1] in ("finished", "interrupted"):
+    if manifest is None or not events or events[-1] in ("finished", "interrupted"):
         return
-    if not counted.missing(cases_in(manifest, counted.cases)):
+    if not counted.missing(cases_in(manifest, counted.cases(manifest["campaign"]["cases"]))):
         yield Damage(f"{JOURNAL}: all cases are there, and no line says that the run was finished", remedy)
 
 
