@@ -32,10 +32,10 @@ def how_it_ended(code: int) -> str:
     return f"ended by {name}"
 
 
-def last_lines(stderr: bytes, count: int = 3) -> str:
-    """The last lines of what was written to stderr, to be put at the end of a sentence."""
+def last_lines(stderr: bytes) -> str:
+    """The last three lines of what was written to stderr, to be put at the end of a sentence."""
     lines = [line.strip() for line in stderr.decode(errors="replace").splitlines() if line.strip()]
-    return f": {' | '.join(lines[-count:])}" if lines else ""
+    return f": {' | '.join(lines[-3:])}" if lines else ""
 
 
 def memory_mib(pid: int) -> float:

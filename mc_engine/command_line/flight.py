@@ -239,8 +239,9 @@ def finish(
         typer.echo(f"report       {report_path}")
     if url is not None:
         echo_publication(store.path, url)
-    failed = failed_cases(store)
-    if failed == sum(store.status_counts().values()):
+    counts = store.status_counts()
+    failed = failed_cases(counts)
+    if failed == sum(counts.values()):
         named = shell_word(campaign or store.path / "campaign.toml")
         typer.echo(f"no case completed; `mc-engine check {named}` looks for the reason in the model", err=True)
     elif line := not_finite_line(store):
@@ -257,7 +258,7 @@ def _finish_shard(store: "Store", max_failed: int | None) -> None:
     typer.echo(f"shard        {store.path}")
     typer.echo(f"cases        {ranges(store.committed())}: " + ", ".join(f"{n:,} {word}" for word, n in counts.items()))
     typer.echo(f"next         {MERGE}")
-    _judge_failures(failed_cases(store), max_failed)
+    _judge_failures(failed_cases(counts), max_failed)
 
 
 def _judge_failures(failed: int, allowed: int | None) -> None:
@@ -292,16 +293,13 @@ def resume(
     if not repair and not looks and is_complete(folder):
         _leave_complete(flown, publish)
         return
-    if looks:
-        from mc_engine.runner.stopping import carry_on
+    from mc_engine.runner.stopping import carry_on
 
-        store = _with_progress(
-            lambda _, note: carry_on(folder, progress=note, **options), folder, _publisher(folder, publish)
-        )
-    else:
-        store = _with_progress(
-            lambda runner, note: runner.resume(folder, progress=note, **options), folder, _publisher(folder, publish)
-        )
+    store = _with_progress(
+        lambda runner, note: (carry_on if looks else runner.resume)(folder, progress=note, **options),
+        folder,
+        _publisher(folder, publish),
+    )
     finish(store, no_report, url=publish)
 
 

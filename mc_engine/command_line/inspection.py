@@ -53,6 +53,8 @@ def debug(
     of its own, there alone. The debugger is that of Python's breakpoint(): pdb, or what PYTHONBREAKPOINT names.
     Without a terminal it reads its commands from standard input.
     """
+    from bdb import BdbQuit
+
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.model.simulator import Simulator
 
@@ -74,9 +76,11 @@ def debug(
         typer.echo(
             f"the campaign has the cases 0 to {campaign.cases - 1}; {case} is one that `extend` would add", err=True
         )
-    ended = _in_debugger(lambda: fly_debugged(campaign.model, inputs, noise, campaign.seed, stop, typer.echo))
-    if ended is not None:
-        _echo_end("the nominal case" if case is None else f"case {case}", ended, stop)
+    try:
+        ended = fly_debugged(campaign.model, inputs, noise, campaign.seed, stop, typer.echo)
+    except BdbQuit:  # the user left the debugger
+        return
+    _echo_end("the nominal case" if case is None else f"case {case}", ended, stop)
 
 
 def _refuse_unknown_event(model: Any, name: str) -> None:
@@ -84,17 +88,6 @@ def _refuse_unknown_event(model: Any, name: str) -> None:
     if name not in known:
         has = f"; it has {listed(known)}" if known else "; it has none"
         leave(USAGE, f'--at-event "{name}": is no event of the model{hint(name, known) or has}')
-
-
-def _in_debugger(fly: Any) -> "Debugged | None":
-    """How the flight ended; None if the user left the debugger before."""
-    from bdb import BdbQuit
-
-    try:
-        ended: Debugged = fly()
-        return ended
-    except BdbQuit:
-        return None
 
 
 def _echo_end(who: str, ended: "Debugged", stop: "Stop | None") -> None:

@@ -34,7 +34,7 @@ class ClusterWorkerPool(WorkerPool):
 
     def __init__(self, setup: WorkerSetup, workers: int, backend: Backend):
         super().__init__()
-        self._site = setup
+        self._setup = setup
         self._patience_s = PATIENCE_S if backend.patience_s is None else backend.patience_s
         self._futures: dict[Task, Any] = {}
         with ExitStack() as held:
@@ -68,7 +68,7 @@ class ClusterWorkerPool(WorkerPool):
     def begin(self, task: Task) -> None:
         if self._client.status in ("closing", "closed"):
             raise WorkersLost("the scheduler is gone")
-        future = self._client.submit(run_in_worker, self._site, task, pure=False, key=None)
+        future = self._client.submit(run_in_worker, self._setup, task, pure=False, key=None)
         self._futures[task] = future  # Dask cancels a task whose future is garbage-collected
         future.add_done_callback(partial(self._on_done, task))
 

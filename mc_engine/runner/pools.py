@@ -86,7 +86,7 @@ class ProcessWorkerPool(WorkerPool):
 
     def __init__(self, setup: WorkerSetup, workers: int):
         super().__init__()
-        self._site, self._workers = setup, workers
+        self._setup, self._workers = setup, workers
         self._held = ExitStack()
         self._held.enter_context(safe_import_path())
         self._executors: list[Any] = []
@@ -102,11 +102,11 @@ class ProcessWorkerPool(WorkerPool):
         executor = self._idle.pop() if self._idle else self._start()
         with unsignalled_children():
             try:
-                future = executor.submit(run_in_worker, self._site, task)
+                future = executor.submit(run_in_worker, self._setup, task)
             except BrokenProcessPool:  # the worker died while it was idle
                 self._drop(executor)
                 executor = self._start()
-                future = executor.submit(run_in_worker, self._site, task)
+                future = executor.submit(run_in_worker, self._setup, task)
         self._busy[task] = executor
         future.add_done_callback(partial(self._on_done, task))
 

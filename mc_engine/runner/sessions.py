@@ -28,6 +28,7 @@ from mc_engine.runner.manifest import columns_of, manifest_of
 from mc_engine.runner.part_bounds import Stretch, part_bounds, stretches
 from mc_engine.runner.pools import pool_of
 from mc_engine.runner.progress import ProgressCall
+from mc_engine.runner.summary import failed_cases
 from mc_engine.shell_words import shell_word
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.store.case_rows import remove_logs
@@ -192,7 +193,7 @@ def _run_tasks(
     Returns when the others began, by `time.perf_counter`.
     """
     counts = store.status_counts()
-    done, failed = sum(counts.values()), _failed(counts)
+    done, failed = sum(counts.values()), failed_cases(counts)
     total = len(store.wanted)
     report = session.progress or (lambda *_: None)
     if not (nominal or tasks) or stopped():
@@ -213,7 +214,7 @@ def _run_tasks(
             commit(receipts)
             for task, written in receipts:
                 done += written.part.rows - (task.base.rows if task.base else 0)
-                failed += _failed(written.part.status) - (_failed(task.base.status) if task.base else 0)
+                failed += failed_cases(written.part.status) - (failed_cases(task.base.status) if task.base else 0)
             report(done, total, failed)
         at_once = leaves and stopped()
         return begun
@@ -224,10 +225,6 @@ def _run_tasks(
         if pool is not None:
             pool.close(at_once)
         store.sweep()
-
-
-def _failed(status: dict[str, int]) -> int:
-    return sum(count for word, count in status.items() if word != STATUS_NAME[OK])
 
 
 def _interrupted(store: Store, without: str = "") -> RunInterrupted:
@@ -254,7 +251,7 @@ def _fly_companion(store: Store, campaign: Campaign, session: Session, repair: b
     elif repair:
         mend_journal(path)
     counts = store.status_counts()
-    after = _counting(session, sum(counts.values()), sum(counts.values()), _failed(counts))
+    after = _counting(session, sum(counts.values()), sum(counts.values()), failed_cases(counts))
     inner = open_store(path)
     if inner.manifest["campaign"]["digest"] != beside.digest:
         raise StoreError(f"{path}: holds flights of another campaign; remove it, and `resume` flies them anew")

@@ -24,9 +24,9 @@ PARTS_AHEAD = 2
 _DIGITS, _ALL_DIGITS = 8, 17  # of a metric: as a rule, and of a double
 
 
-def failed_cases(store: Store) -> int:
-    """Number of committed cases that did not complete."""
-    return sum(count for word, count in store.status_counts().items() if word != STATUS_NAME[OK])
+def failed_cases(counts: Mapping[str, int]) -> int:
+    """Number of cases that did not complete, of the counts by status."""
+    return sum(count for word, count in counts.items() if word != STATUS_NAME[OK])
 
 
 def first_not_finite(store: Store) -> int | None:

@@ -24,7 +24,7 @@ def test_numbers_of_a_verdict_count_failed_cases_as_not_inside(tmp_path):
     fuel, zero = judgement(store)[0]
     assert (fuel.passed, fuel.tried) == (36, 40)
     assert zero.passed == 0
-    assert failed_cases(store) == 4
+    assert failed_cases(store.status_counts()) == 4
     assert np.isnan(store.cases()["propellant_kg"]).sum() == 4
 
 
