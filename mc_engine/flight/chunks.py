@@ -26,7 +26,7 @@ from mc_engine.store.parts import CASE_COLUMNS, Column, Part, Written, read_part
 from mc_engine.store.run_files import NOMINAL_CASE
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 64, Flyer.largest_chunk
-Guard = Callable[[np.ndarray], AbstractContextManager[None]]
+Guard = Callable[[np.ndarray], AbstractContextManager[Any]]
 
 
 def chunk_size(cases: int, workers: int, flyer: Flyer | type[Flyer] = Flyer) -> int:
@@ -112,7 +112,7 @@ def run_task(
     flights = []
     if fresh.size:
         keep = run if task.first != NOMINAL_CASE else None
-        flight = fly_cases(campaign, fresh, batch, guard or _unguarded, len(task.alone), keep, log, stopped, flyer)
+        flight = fly_cases(campaign, fresh, batch, guard or nullcontext, len(task.alone), keep, log, stopped, flyer)
         flights.append({**flight, "case_id": fresh})
     names = [column.name for column in columns]
     if known:
@@ -127,15 +127,11 @@ def run_task(
     return written
 
 
-def _unguarded(cases: np.ndarray) -> AbstractContextManager[None]:
-    return nullcontext()
-
-
 def fly_cases(
     campaign: Campaign,
     case_ids: np.ndarray,
     batch: int | None = None,
-    guard: Guard = _unguarded,
+    guard: Guard = nullcontext,
     alone: int = 0,
     keep: Path | None = None,
     log: RowLog | None = None,
@@ -153,12 +149,13 @@ def fly_cases(
     with naming_faults(campaign.model_reference, cases_in_words(case_ids.min(), case_ids.max())):
         for piece in (slice(*edge) for edge in pairwise(edges)):
             inputs = full_inputs(campaign, {name: column[piece] for name, column in table.items()})
-            if guard is not _unguarded:
-                flyer.start()
+            flyer.start()
             with guard(case_ids[piece]):
                 rows = None if log is None else log.of(case_ids[piece])
                 flights.append(flyer.fly(inputs, noise[piece], rows, keep, stopped))
-    flight = flights[0] if len(flights) == 1 else _stacked(flights)
+    flight = flights[0]
+    if len(flights) > 1:
+        flight = {name: np.concatenate([columns[name] for columns in flights]) for name in flight}
     name_upstream(campaign, case_ids, flight)
     return {**table, **flight}
 
@@ -176,10 +173,6 @@ def drawn(campaign: Campaign, case_ids: np.ndarray) -> tuple[Columns, np.ndarray
 def cases_in_words(first: int, last: int) -> str:
     """Such as "cases 64 to 127", for messages."""
     return "the nominal case" if first == NOMINAL_CASE else f"cases {first} to {last}"
-
-
-def _stacked(tables: Sequence[Mapping[str, np.ndarray]]) -> Columns:
-    return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
 
 
 def fly_in_threads(

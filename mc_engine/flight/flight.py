@@ -15,7 +15,7 @@ from mc_engine.flight.kernel_parts import blocks_of, settings_class
 from mc_engine.lanes.kernel_data import gathered
 from mc_engine.lanes.philox import noise_key
 from mc_engine.model.designs import designing
-from mc_engine.model.fields import AdaptiveStep, Field, FixedStep, Parameter, Setting
+from mc_engine.model.fields import AdaptiveStep, Field, FixedStep, inputs_of
 from mc_engine.model.preparation import Inputs, Prepared, prepare
 from mc_engine.model.record import Model, Refusals
 from mc_engine.model.trial import refuse_unfit
@@ -144,13 +144,10 @@ def _fly_group(
     # blocks on a fixed grid are filled up; adaptive lanes take the cases in turn, and want one each to begin with
     padded = max(n, width) if isinstance(clock, AdaptiveStep) else -(-n // width) * width
     out = _outputs(model, padded)
-    parameters, ids = ready.parameters, case_ids
-    if n < max(padded, len(case_ids)):  # else these are all cases, in their order
+    index: np.ndarray | slice = slice(None)  # all cases, in their order
+    if n < max(padded, len(case_ids)):
         index = np.concatenate([chosen, np.full(padded - n, chosen[-1])])
-        parameters, ids = parameters[:, index], ids[index]
-    settings = np.ascontiguousarray(ready.settings[chosen[0]])
-    cases = parameters, settings, ready.tables
-    _bound_kernel(model, clock, folder, width, cases, seed, ids, out, build=build)()
+    _bound_kernel(model, clock, folder, width, ready, index, case_ids, seed, out, build=build)()
     return tuple(numbers[..., :n] for numbers in out)
 
 
@@ -163,9 +160,10 @@ def _bound_kernel(
     clock: FixedStep | AdaptiveStep,
     folder: Path | None,
     width: int,
-    inputs: tuple[np.ndarray, np.ndarray, np.ndarray],
-    seed: int,
+    ready: Prepared,
+    index: np.ndarray | slice,
     case_ids: np.ndarray,
+    seed: int,
     out: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     recording: tuple[Any, np.ndarray, Any] = _NO_RECORDING,
     kernel: Callable[..., Any] | None = None,
@@ -173,17 +171,18 @@ def _bound_kernel(
 ) -> Callable[[], Any]:
     """The kernel with all its arguments.
 
-    inputs : parameters [n_kernel_parameters, n], setting codes, tables of the cases
+    index : the cases that fly, of those that are ready; all of the same settings
     recording : history and its rows, see `mc_engine.lanes.history`; pace of each case or of all, in steps from row to
         row or, if the steps are adaptive, in rows of a step
     kernel : in place of the model's own
     """
-    (parameters, settings, tables), (history, rows, pace) = inputs, recording
-    chosen = settings_of(model, settings, tables)
+    history, rows, pace = recording
+    parameters, settings = ready.parameters[:, index], np.ascontiguousarray(ready.settings[index][0])
+    chosen = settings_of(model, settings, ready.tables)
     if kernel is None:
         refuse_unfit(model, parameters, chosen)
         kernel = (build or build_kernel)(model, folder, width)
-    cases = np.ascontiguousarray(case_ids, dtype=np.float64)
+    cases = np.ascontiguousarray(case_ids[index], dtype=np.float64)
     numbers, data = _kernel_settings(model, settings, chosen), gathered(blocks_of(model))
     shared = np.ascontiguousarray(parameters), numbers, data, np.uint64(noise_key(seed)), cases
     if isinstance(clock, AdaptiveStep):
@@ -206,10 +205,8 @@ def bound_flight(
         raise ModelError(f"no case can start: {ready.refusals.reason[0]}")
     chosen = np.resize(groups[0], -(-groups[0].size // width) * width)
     out = _outputs(model, chosen.size)
-    settings = np.ascontiguousarray(ready.settings[chosen[0]])
-    cases = ready.parameters[:, chosen], settings, ready.tables
-    ids = case_ids[chosen]
-    return _bound_kernel(model, model.clock, folder, width, cases, seed, ids, out), out[0], settings
+    kernel = _bound_kernel(model, model.clock, folder, width, ready, chosen, case_ids, seed, out)
+    return kernel, out[0], ready.settings[chosen[0]]
 
 
 def fly_interpreted(
@@ -220,20 +217,17 @@ def fly_interpreted(
     The case must be able to start.  flight : an `InterpretedFlight`, or what has a `model` and a `kernel` as it does;
     OutOfTime after the seconds that it may take.  history : as the kernel takes it, a row for every step.
     """
-    ready = prepare(flight.model, inputs, 1)
-    settings, out = np.ascontiguousarray(ready.settings[0]), _outputs(flight.model, 1)
-    cases = ready.parameters, settings, ready.tables
-    clock, ids = flight.model.clock, np.array([case_id])
-    recording = history, np.zeros(1, dtype=np.int64), np.ones(1)
-    _bound_kernel(flight.model, clock, None, 1, cases, seed, ids, out, recording, flight.kernel)()
+    model, ids, out = flight.model, np.array([case_id]), _outputs(flight.model, 1)
+    ready, recording = prepare(model, inputs, 1), (history, np.zeros(1, dtype=np.int64), np.ones(1))
+    _bound_kernel(model, model.clock, None, 1, ready, slice(None), ids, seed, out, recording, flight.kernel)()
     return out
 
 
 def fly_history(
-    model: Model, inputs: Inputs, case_id: int, seed: int, *, folder: Path | None = None, **options: Any
+    model: Model, inputs: Inputs, case_id: int, seed: int, **options: Any
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """(columns, history) of one case, see `fly_histories`."""
-    return next(fly_histories(model, inputs, np.array([case_id]), seed, folder=folder, **options))
+    """(columns, history) of one case, with the options of `fly_histories`."""
+    return next(fly_histories(model, inputs, np.array([case_id]), seed, **options))
 
 
 def fly_histories(
@@ -356,13 +350,10 @@ class _Recorder:
             room = min(room, _MOST_NUMBERS // n_lines)
         if n_lines > self._history.shape[0] or room > self._history.shape[1]:
             self._history = np.empty((n_lines, int(room)))
-        index = np.resize(chosen, self._width)
-        settings, out = np.ascontiguousarray(self._ready.settings[chosen[0]]), _outputs(self._model, self._width)
-        inputs = self._ready.parameters[:, index], settings, self._ready.tables
+        model, width, out = self._model, self._width, _outputs(self._model, self._width)
         rows = np.zeros(chosen.size, dtype=np.int64)  # lanes beyond these record nothing
-        recording = self._history, rows, pace
-        model, ids = self._model, self._case_ids[index]
-        _bound_kernel(model, model.clock, self._folder, self._width, inputs, self._seed, ids, out, recording)()
+        cases = self._ready, np.resize(chosen, width), self._case_ids, self._seed
+        _bound_kernel(model, model.clock, self._folder, width, *cases, out, (self._history, rows, pace))()
         return out, rows
 
 
@@ -389,8 +380,7 @@ def chosen_history(model: Model, inputs: Inputs, *, rows: int = 2001, seed: int 
 
 
 def _complete(model: Model, inputs: Inputs) -> dict[str, Any]:
-    items: tuple[Parameter | Setting, ...] = (*model.parameters, *model.settings)
-    nominal = {item.name: item.default for item in items}
+    nominal = {name: item.default for name, item in inputs_of(model).items()}
     if unknown := sorted(inputs.keys() - nominal.keys()):
         raise ValueError(f"{', '.join(unknown)}: no input of the model")
     return {**nominal, **inputs}

@@ -114,7 +114,7 @@ class Flyer(ABC):
         if not isinstance(value, float | np.floating):
             return bool(stored != value)
         if self.tolerance is None:
-            return np.float64(stored).tobytes() != np.float64(value).tobytes()
+            return other_bits(stored, value)
         if not (np.isfinite(stored) and np.isfinite(value)):
             return not np.array_equal(stored, value, equal_nan=True)
         return bool(abs(stored - value) > self.tolerance * max(abs(stored), abs(value)))
@@ -122,6 +122,11 @@ class Flyer(ABC):
     def lost_number(self, inputs: Inputs, noise: int, results: Columns, who: str) -> str:
         """Where a number of a failed flight became infinite or NaN, as a sentence; empty where that is not known."""
         return ""
+
+
+def other_bits(a: Any, b: Any) -> bool:
+    """Whether two numbers differ in any bit."""
+    return np.float64(a).tobytes() != np.float64(b).tobytes()
 
 
 def status_words(status: np.ndarray) -> np.ndarray:

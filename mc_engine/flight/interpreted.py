@@ -38,6 +38,8 @@ class InterpretedFlight:
     origin : of the latest number that made a state, or an error of one, not finite.  metrics : what `evaluate` gave.
     """
 
+    composed, alternatives = ComposedFunction, Alternatives
+
     def __init__(self, model: Model, seconds: float = math.inf):
         from mc_engine.flight.kernel_parts import PHYSICS, functions_of, second_order_of, settings_class
 
@@ -152,12 +154,6 @@ class InterpretedFlight:
             return fields
 
         return hand_on
-
-    def composed(self, calls: Any, record: Any, picks: Any) -> Callable[..., Any]:
-        return ComposedFunction(calls, record, picks)
-
-    def alternatives(self, number: Any, functions: Any) -> Callable[..., Any]:
-        return Alternatives(number, functions)
 
     def picker(self, cls: Any, picks: Sequence[tuple[int, float, float]], count: Any = None) -> Callable[[Any], Any]:
         def pick(fields: Any) -> Any:

@@ -14,9 +14,9 @@ from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import ModelError
 from mc_engine.flight.case_process import CaseEnded, CaseProcess, give_back, take
 from mc_engine.flight.case_worker import Order, Setup, folder_name, settle
-from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, Inputs, Process, RunStopped, never
+from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, Inputs, Process, RunStopped, never, other_bits
 from mc_engine.flight.program_flight import Flown
-from mc_engine.model.fields import Parameter, Setting
+from mc_engine.model.fields import Setting, inputs_of
 from mc_engine.model.record import Refusals
 from mc_engine.model.simulator import Simulator
 from mc_engine.numbers_in_text import counted
@@ -37,13 +37,13 @@ class SimulatorFlyer(Flyer):
 
     def __init__(self, campaign: Campaign):
         assert isinstance(campaign.model, Simulator)  # the caller looked
-        self._campaign, self._simulator = campaign, campaign.model
-        self.keeps_rows = not self._simulator.batch  # a batch is one piece of work, as a chunk of a model is
-        self.batch = _TOGETHER if self._simulator.batch else 1
-        self.most_workers = self._simulator.slots
-        self.tolerance = None if self._simulator.deterministic else self._simulator.tolerance
-        self._names = [metric.name for metric in self._simulator.metrics]
-        self._key = (self._simulator.reference, str(campaign.directory), self.digest(), campaign.seed)
+        self._campaign, self.simulator = campaign, campaign.model
+        self.keeps_rows = not self.simulator.batch  # a batch is one piece of work, as a chunk of a model is
+        self.batch = _TOGETHER if self.simulator.batch else 1
+        self.most_workers = self.simulator.slots
+        self.tolerance = None if self.simulator.deterministic else self.simulator.tolerance
+        self._names = [metric.name for metric in self.simulator.metrics]
+        self._key = (self.simulator.reference, str(campaign.directory), self.digest(), campaign.seed)
 
     def fly(
         self,
@@ -62,8 +62,7 @@ class SimulatorFlyer(Flyer):
     def refusals(self, columns: Columns, n: int) -> list[str]:
         """Why each case cannot be flown whose inputs are outside what the simulator accepts; else empty."""
         refusals = Refusals.none(n)
-        items: tuple[Parameter | Setting, ...] = (*self._simulator.parameters, *self._simulator.settings)
-        for item in items:
+        for item in inputs_of(self.simulator).values():
             if isinstance(item, Setting) and (item.choices or item.date or isinstance(item.default, bool)):
                 continue
             column = columns[item.name]
@@ -82,7 +81,7 @@ class SimulatorFlyer(Flyer):
         found: list[Columns] = []
         flight = _Flight(self, columns, noise, None, never, on_history=found.append)
         flight.fly()
-        names = ["t_s", *(output.name for output in self._simulator.outputs)]
+        names = ["t_s", *(output.name for output in self.simulator.outputs)]
         history = found[0] if found and found[0] else {name: np.empty(0) for name in names}
         every = max(1, -(-len(history["t_s"]) // rows))
         chosen = np.arange(len(history["t_s"]))
@@ -90,7 +89,7 @@ class SimulatorFlyer(Flyer):
         return flight.results, {name: values[chosen] for name, values in history.items()}
 
     def digest(self) -> str:
-        return self._simulator.digest()
+        return self.simulator.digest()
 
     def make_ready(self) -> None:
         """Nothing: each worker starts a process of its own."""
@@ -99,9 +98,9 @@ class SimulatorFlyer(Flyer):
         self.give_back(self.process())
 
     def faults(self) -> list[str]:
-        if self._simulator.fly is None and not self._simulator.is_described:
+        if self.simulator.fly is None and not self.simulator.is_described:
             why = "has no function `fly`, no command and no FMU; `mc-engine import` reads results from elsewhere"
-            return [f"{self._simulator.reference}: {why}"]
+            return [f"{self.simulator.reference}: {why}"]
         return []  # all else that is wrong with a simulator is found where it is loaded
 
     def refuse_faults(self) -> None:
@@ -132,12 +131,12 @@ class SimulatorFlyer(Flyer):
         seconds = (time.perf_counter() - begin) / 4
         first, dispersed = twice[0]
         differing = [
-            name for name in self._names if any(self._differ(a[name], b[name]) for a, b in zip(*twice, strict=True))
+            name for name in self._names if any(other_bits(a[name], b[name]) for a, b in zip(*twice, strict=True))
         ]
         lines = ["deterministic: two flights of two cases give the same bits"]
         if differing:
             lines = [f"not deterministic: {', '.join(differing)} differ between two flights of a case"]
-            if self._simulator.deterministic:
+            if self.simulator.deterministic:
                 lines[0] += "; `replay` will not find the same bits, say deterministic = false with a tolerance"
         still = [name for name in self._names if first[name] == dispersed[name]]
         if still and dispersed["status"] == first["status"] == STATUS_NAME[OK]:
@@ -153,10 +152,6 @@ class SimulatorFlyer(Flyer):
         )
         return lines
 
-    @staticmethod
-    def _differ(a: float, b: float) -> bool:
-        return np.float64(a).tobytes() != np.float64(b).tobytes()
-
     def process(self) -> CaseProcess:
         """A process of this simulator, from those that wait or new."""
         return take(self._key, self._setup)
@@ -165,15 +160,11 @@ class SimulatorFlyer(Flyer):
         give_back(self._key, process)
 
     def _setup(self) -> Setup:
-        simulator, folder = self._simulator, str(self._campaign.directory)
+        simulator, folder = self.simulator, str(self._campaign.directory)
         sent = replace(simulator, sources=None, figures=(), published=()) if simulator.is_described else None
         of_program = simulator.program is not None  # which is limited itself, and not what starts it
         memory = None if of_program else simulator.memory_limit_mib
         return Setup(simulator.reference, folder, self._key[2], self._campaign.seed, sent, memory)
-
-    @property
-    def simulator(self) -> Simulator:
-        return self._simulator
 
 
 class _Flight:

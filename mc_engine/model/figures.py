@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from mc_engine.errors import ModelError
-from mc_engine.model.fields import refuse_other_types
+from mc_engine.model.fields import inputs_of, refuse_other_types
 from mc_engine.suggestions import hint, nearest
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ def refuse_kinds(figure: Figure, figure_name: str) -> None:
 
 def _names_in_figure(figure: Figure, model: "System") -> Iterator[tuple[str, str, list[str]]]:
     """Every name in the figure that the model must have: what it is, the name, all that there are."""
-    inputs = [item.name for item in (*model.parameters, *model.settings)]
+    inputs = inputs_of(model)
     metrics = [metric.name for metric in model.metrics]
     columns = [*inputs, *metrics, *(f"end_{state.name}" for state in model.states), *_OF_EVERY_CASE]
     outputs = [output.name for output in model.quantities]
@@ -214,7 +214,7 @@ def _hint(name: str, known: list[str]) -> str:
 
 def _other_table(name: str, word: str, model: "System") -> str:
     """Why a name that the model has is not for this figure: histories and the table of cases are two tables."""
-    if word == "output" and name in [item.name for item in (*model.parameters, *model.settings, *model.metrics)]:
+    if word == "output" and name in [*inputs_of(model), *(metric.name for metric in model.metrics)]:
         return " (it is a column of the table of cases, histories do not have it)"
     if word in ("column", "metric") and name in [output.name for output in model.quantities]:
         return " (it is an output of histories, the table of cases does not have it)"

@@ -4,8 +4,7 @@
 """
 
 import inspect
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -52,7 +51,8 @@ def prepare(model: Model, inputs: Inputs, n_cases: int) -> Prepared:
         setattr(si, parameter.symbol, np.full(n_cases, column) if repeat else column)
     settings = np.zeros((n_cases, max(1, len(model.settings))))
     for i, setting in enumerate(model.settings):
-        settings[:, i] = _setting_codes(setting, inputs[setting.name])
+        given = inputs[setting.name]  # one value for all cases, or one each
+        settings[:, i] = setting.code(given) if np.ndim(given) == 0 else [setting.code(value) for value in given]
     columns: Mapping[str, np.ndarray] = vars(si)
     if model.prepare is not None:
         words = SimpleNamespace(**{setting.symbol: settings[:, i] for i, setting in enumerate(model.settings)})
@@ -114,11 +114,6 @@ def _design(model: Model) -> str:
     return f"{place_of(model.prepare)}: `prepare`" if model.prepare else "the model"
 
 
-def _setting_codes(setting: Any, values: Any) -> Any:
-    """One code for all cases, or one each."""
-    return setting.code(values) if np.ndim(values) == 0 else [setting.code(value) for value in values]
-
-
 def call_prepare(model: Model, inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> Any:
     """What the model's `prepare` returns; ModelError with the line and the fix where it misuses what it is handed.
 
@@ -129,16 +124,9 @@ def call_prepare(model: Model, inputs: SimpleNamespace, settings: SimpleNamespac
         code = model.prepare.__code__
         place = f"{Path(code.co_filename).name}, line {code.co_firstlineno}"
         raise ModelError(f"{place}: `prepare` is an async def; write def, the engine waits for nothing")
-    # refused cases may divide by zero on their way
-    with np.errstate(all="ignore"), _explaining(model):
-        return model.prepare(inputs, settings, refusals)
-
-
-@contextmanager
-def _explaining(model: Model) -> Iterator[None]:
-    """ModelError with the line, the error and the rules of `prepare` for errors of a wrong use."""
     try:
-        yield
+        with np.errstate(all="ignore"):  # refused cases may divide by zero on their way
+            return model.prepare(inputs, settings, refusals)
     except MISUSES as error:
         raise ModelError(f"{place_in_model(error) or 'the model'}: {misuse(error, model.parameters)}") from error
 
