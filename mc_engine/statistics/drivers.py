@@ -86,7 +86,7 @@ def failure_drivers(inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray])
     Benjamini & Hochberg, J. R. Stat. Soc. B 57 (1995), 289-300, over all tests of singles, and over all of pairs.
     """
     every = np.array([np.asarray(cases, dtype=bool) for cases in failed.values()])
-    decided = [k for k, lost in enumerate(every) if min(lost.sum(), (~lost).sum()) >= FEWEST]
+    decided = [k for k, lost in enumerate(every) if _fewer_group(lost) >= FEWEST]
     names = list(failed)
     undecided = tuple(name for k, name in enumerate(names) if k not in decided)
     if not decided:

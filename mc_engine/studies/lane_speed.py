@@ -177,10 +177,10 @@ def compare_methods(campaign: Campaign, n_cases: int | None, repeats: int) -> li
     trials = _Trials(campaign_flight(campaign, _TRIAL))
     error, metric = trials.largest_error(trials.own)
     known: list[tuple[Clock, float]] = [(trials.own, error)]
-    if not np.isfinite(known[0][1]):
+    if not np.isfinite(error):
         raise ModelError("methods are not compared: by the model's own, cases end otherwise than by the finest steps")
     for clocks in trials.ladders():
-        found = _first_within(trials, clocks, max(known[0][1], _ROUNDING))
+        found = _first_within(trials, clocks, max(error, _ROUNDING))
         known += [found] if found else []
     timed = campaign_flight(campaign, n_cases)
     models = [replace(timed, model=replace(timed.model, clock=clock)) for clock, _ in known]

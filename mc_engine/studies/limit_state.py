@@ -23,6 +23,7 @@ from mc_engine.sampling.correlation import correlated, gaussian_copula
 from mc_engine.sampling.designs import RANDOM
 from mc_engine.sampling.distributions import Constant, Discrete, Empirical, quantiles
 from mc_engine.statistics.requirements import inside_limits
+from mc_engine.statistics.worst import Limits
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.suggestions import hint, listed
 
@@ -65,10 +66,8 @@ class LimitState:
             flown = fly_in_threads(self.campaign, self.inputs(u), ids, ["status", requirement.metric], self._workers)
         status, metric = flown["status"], flown[requirement.metric]
         able = (status == STATUS_NAME[OK]) & np.isfinite(metric)
-        upper = np.inf if requirement.at_most is None else requirement.at_most
-        lower = -np.inf if requirement.at_least is None else requirement.at_least
         with np.errstate(invalid="ignore"):
-            margin = np.where(able, np.minimum(upper - metric, metric - lower), -np.inf)
+            margin = np.where(able, Limits(requirement.at_most, requirement.at_least).distances(metric), -np.inf)
         # a case right at its limit is inside: the engine's word for it, safe from rounding of the difference
         inside = able & inside_limits(metric, requirement.at_most, requirement.at_least)
         margin = np.where(inside, np.maximum(margin, AT_LIMIT), np.minimum(margin, 0.0))

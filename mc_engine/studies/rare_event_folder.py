@@ -75,10 +75,10 @@ def probability_words(result: dict[str, Any]) -> str:
     )
 
 
-def printed_interval(result: dict[str, Any], digits: int = 3) -> tuple[float, float]:
-    """Its ends in so many significant digits, each rounded outward: what is printed holds what was found."""
+def printed_interval(result: dict[str, Any]) -> tuple[float, float]:
+    """Its ends in three significant digits, each rounded outward: what is printed holds what was found."""
     lower, upper = result["lower"], result["upper"]
-    return outward(lower, decimals_of(lower, digits), False), outward(upper, decimals_of(upper, digits), True)
+    return outward(lower, decimals_of(lower, 3), False), outward(upper, decimals_of(upper, 3), True)
 
 
 def standing(result: dict[str, Any]) -> str:
