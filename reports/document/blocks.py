@@ -136,7 +136,6 @@ class CaseData:
     time: str
     quantities: dict[str, str]
     histories: dict[int, dict[str, tuple[Any, Any]]]
-    histories_left_out: int = 0
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,10 @@
 
 from math import ceil, floor, inf, log10
 
-from reports.text.numbers import SPACE, number
+from reports.text.numbers import SPACE, SUPERSCRIPT, number
 
 MOST_TICKS = 6  # of an axis
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
-_SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
 def nice_ticks(low: float, high: float, most: int, *, whole: bool = False, cover: bool = False) -> list[float]:
@@ -52,4 +51,4 @@ def numerals(places: list[float], log: bool = False) -> tuple[list[str], str]:
     decimals = max((len(f"{item:.9f}".rstrip("0").partition(".")[2]) for item in shown), default=0)
     groups = SPACE if largest >= 1e4 else ""
     texts = [f"{item + 0.0:,.{decimals}f}".replace("-", "−").replace(",", groups) for item in shown]
-    return texts, f"×10{str(power).translate(_SUPERSCRIPT)}" if power else ""
+    return texts, f"×10{str(power).translate(SUPERSCRIPT)}" if power else ""

@@ -24,7 +24,8 @@ from reports.footprint.landings import KILOMETRES, Landing, height_limit, landin
 from reports.footprint.map_files import MapOutline, Mark, Places, geojson, kml
 from reports.run.flown import Flown
 from reports.sections.figure_blocks import thinned_rows
-from reports.text.numbers import count, counted, given_percent, interval, number, percent
+from reports.sections.tables import quantile_cell
+from reports.text.numbers import count, counted, given_percent, number, percent
 
 DRAWN_REGION = 0.9  # content of the one region in the figure; more would hide the ellipses
 DISTANCES = (0.5, 0.9, 0.99)
@@ -283,12 +284,7 @@ def _distance_row(flown: Flown, landing: Landing, place: Mark) -> tuple[Cell, ..
         landing.distances(flown, place), probabilities=_distances(flown), confidence=flown.stated.two_sided
     )
     spread = summary.spread
-    cells = [
-        Cell(
-            number(item.value, 4, spread), item.value, interval(item.lower, item.upper, spread) if flown.random else ""
-        )
-        for item in summary.quantiles
-    ]
+    cells = [quantile_cell(flown, item, spread, 4) for item in summary.quantiles]
     used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
     largest = Cell(number(summary.maximum, 4, spread), summary.maximum)
     return (Cell(place.name, small=_place_words(place.latitude, place.longitude)), used, *cells, largest)

@@ -112,7 +112,8 @@ def case_record(document: Document) -> dict[str, Any] | None:
         "outcome": screen.typed(cases.outcome, "u1"),
         "outcomes": cases.outcomes,
         "columns": [{"name": column.name, "label": column.label, "role": column.role,
-                     "values": _column_values(column.values)} for column in cases.columns],
+                     "values": screen.column(column.values) if isinstance(column.values, np.ndarray) else column.values}
+                    for column in cases.columns],
         "axes": cases.axes,
         "clouds": [trace for cloud in clouds for trace in screen.traced(cloud, Plot((), Axis(), Axis()))],
         "quantities": [{"name": name, "label": label} for name, label in cases.quantities.items()],
@@ -122,10 +123,6 @@ def case_record(document: Document) -> dict[str, Any] | None:
         },
         "panel": screen.history_panel(cases.time),
     }  # fmt: skip
-
-
-def _column_values(values: np.ndarray | tuple[str, ...]) -> Any:
-    return screen.column(values) if isinstance(values, np.ndarray) else values
 
 
 def _background(plot: Plot) -> dict[str, Any]:

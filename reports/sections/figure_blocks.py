@@ -46,12 +46,12 @@ def thinned_rows(rows: np.ndarray, always: np.ndarray, most: int = POINTS_SHOWN)
     return np.union1d(even, always[rows[place] == always])
 
 
-def thinned_by_outcome(rows: np.ndarray, outcome: np.ndarray, most: int = POINTS_SHOWN) -> np.ndarray:
-    """At most about `most` of the ascending row numbers, the same share of every outcome, evenly through the table.
+def thinned_by_outcome(rows: np.ndarray, outcome: np.ndarray) -> np.ndarray:
+    """About POINTS_SHOWN of the ascending row numbers at most: the same share of every outcome, evenly spread.
 
     An outcome of up to FEWEST_SHOWN cases is drawn whole.
     """
-    share = min(1.0, most / max(rows.size, 1))
+    share = min(1.0, POINTS_SHOWN / max(rows.size, 1))
     groups = [rows[outcome[rows] == kind] for kind in np.unique(outcome[rows])]
     kept = [max(round(share * group.size), min(FEWEST_SHOWN, group.size)) for group in groups]
     chosen = [group[np.linspace(0, group.size - 1, n).astype(np.int64)] for group, n in zip(groups, kept, strict=True)]
@@ -159,11 +159,8 @@ def _distribution_figures(flown: Flown, names: list[str], title: str, height: fl
         group = names[len(names) * page // pages : len(names) * (page + 1) // pages]
         plots = [_distribution_plot(flown, name, height) for name in group]
         part = f" ({page + 1} of {pages})" if pages > 1 else ""
-        yield FigureBlock(f"{title}{part}, {_used(flown)}", histograms(plots), "small")
-
-
-def _used(flown: Flown) -> str:
-    return f"{counted(flown.n_tried, 'case')}, fewer where a panel says so."
+        used = f"{counted(flown.n_tried, 'case')}, fewer where a panel says so."
+        yield FigureBlock(f"{title}{part}, {used}", histograms(plots), "small")
 
 
 def _distribution_plot(flown: Flown, name: str, height: float) -> Plot:

@@ -11,6 +11,7 @@ from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.drawing.marks import Drawing, Plot
 from reports.figures.rows import SPREAD, level_panel
 from reports.run.flown import Flown
+from reports.sections.tables import quantile_cell
 from reports.text.numbers import axis_label, count, given_percent, interval, number, percent
 
 MOST_LEVELS = 20
@@ -106,14 +107,8 @@ def _level_table(
     for place, (level, group) in enumerate(zip(levels, rows, strict=True)):
         summary = summarize(values[group], probabilities=probabilities, confidence=flown.stated.two_sided)
         worst = summary.maximum if large or flown.chosen else summary.minimum
-        cells = [
-            Cell(
-                number(item.value, 4, summary.spread),
-                item.value,
-                _bounds(flown, item.lower, item.upper, summary.spread),
-            )
-            for item in summary.quantiles
-        ] or [Cell("–") for _ in probabilities]
+        cells = [quantile_cell(flown, item, summary.spread, 4) for item in summary.quantiles]
+        cells = cells or [Cell("–") for _ in probabilities]
         if flown.chosen:
             cells.insert(0, Cell(number(summary.minimum, 4, summary.spread), summary.minimum))
         used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
@@ -124,10 +119,6 @@ def _level_table(
     return Table(
         title[:1].upper() + title[1:], columns, tuple(body), _pairing_note(flown, levels[0], bool(len(matched)))
     )
-
-
-def _bounds(flown: Flown, lower: float | None, upper: float | None, scale: float | None) -> str:
-    return interval(lower, upper, scale) if flown.random else ""
 
 
 def _difference_cells(flown: Flown, values: np.ndarray, matched: np.ndarray, place: int) -> tuple[Cell, Cell]:

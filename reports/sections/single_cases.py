@@ -86,7 +86,7 @@ def case_data(flown: Flown, sections: Iterable[Section]) -> CaseData | None:
     everything = flown.n_tried * len(key) <= MOST_NUMBERS
     further = min(max(ROOM // flown.n_tried - len(key), 0), MOST_METRICS) if everything else 0
     facts = _shown_columns(flown, len(key) + further)
-    histories, left_out = case_histories(flown)
+    histories = case_histories(flown)
     rows = np.arange(flown.n_held) if everything else _held_rows(flown, sections, histories, max(1, len(facts)))
     return CaseData(
         n_tried=flown.n_tried,
@@ -96,9 +96,8 @@ def case_data(flown: Flown, sections: Iterable[Section]) -> CaseData | None:
         columns=tuple(_column(flown, fact, rows) for fact in facts) + tuple(_place_columns(flown, sections, rows)),
         axes=case_axes(flown),
         time=axis_label("time", flown.unit("t_s")),
-        quantities={name: _quantity_label(flown, name) for name in _quantities(flown, histories)},
+        quantities={name: axis_label(flown.words(name), flown.unit(name)) for name in _quantities(flown, histories)},
         histories=histories,
-        histories_left_out=left_out,
     )
 
 
@@ -156,20 +155,19 @@ def _drawn_cases(sections: Iterable[Section]) -> Iterator[np.ndarray]:
 # ---- histories
 
 
-def case_histories(flown: Flown) -> tuple[dict[int, dict[str, tuple[Any, Any]]], int]:
-    """Thinned curves of the saved and replayed histories: the nominal, the worst, the failed, then the others.
+def case_histories(flown: Flown) -> dict[int, dict[str, tuple[Any, Any]]]:
+    """Thinned curves of the saved and replayed histories, by case and quantity, as many as there is room for.
 
-    Returns them by case and quantity, and how many cases the budget leaves out.
+    First the nominal case, then the worst, the failed, and the others.
     """
     table = _all_histories(flown)
     if not len(table):
-        return {}, 0
+        return {}
     names = quantity_names(table)
     frames = {int(case): frame for case, frame in table.groupby("case_id", sort=True)}
     ordered = [case for case in dict.fromkeys([NOMINAL_CASE, *_first_of_all(flown), *frames]) if case in frames]
     most = max(1, MOST_SAMPLES // (2 * SAMPLES * max(1, len(names))))
-    chosen = {case: _curves(frames[case], names) for case in ordered[:most]}
-    return chosen, len(ordered) - len(chosen)
+    return {case: _curves(frames[case], names) for case in ordered[:most]}
 
 
 def _first_of_all(flown: Flown) -> Iterator[int]:
@@ -215,7 +213,3 @@ def _quantities(flown: Flown, histories: dict[int, dict[str, tuple[Any, Any]]]) 
     drawn = [name for figure in flown.figures for name in getattr(figure, "quantities", ())]
     varying = {name for name, values in every.items() if not is_constant(np.concatenate(values))}
     return [name for name in dict.fromkeys([*drawn, *every]) if name in varying]
-
-
-def _quantity_label(flown: Flown, name: str) -> str:
-    return axis_label(flown.words(name), flown.unit(name))

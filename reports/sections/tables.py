@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.statistics import Summary, Verdict
+from mc_engine.statistics import Quantile, Summary, Verdict
 from mc_engine.units import convert
 from reports.document.blocks import Cell, Column, Table
 from reports.run.chosen_units import chosen_unit
@@ -126,6 +126,12 @@ def shape_cell(summary: Summary) -> Cell:
     return Cell("near normal" if shape.looks_normal else "not normal", small=figures)
 
 
+def quantile_cell(flown: Flown, quantile: Quantile, spread: float | None, digits: int = 5) -> Cell:
+    """A quantile; below it, of a random sample, its interval."""
+    below = interval(quantile.lower, quantile.upper, spread) if flown.random else ""
+    return Cell(number(quantile.value, digits, spread), quantile.value, below)
+
+
 def quantile_table(flown: Flown) -> Table | None:
     """The quantiles of every metric with their intervals; None if no metric has one."""
     drawn = {name: summary for name, summary in flown.summaries.items() if summary.quantiles and not summary.constant}
@@ -139,15 +145,7 @@ def quantile_table(flown: Flown) -> Table | None:
     )
     rows = []
     for name, summary in drawn.items():
-        cells = [
-            Cell(
-                number(item.value, scale=summary.spread),
-                item.value,
-                interval(item.lower, item.upper, summary.spread) if flown.random else "",
-            )
-            for item in summary.quantiles
-            if item.probability in shown
-        ]
+        cells = [quantile_cell(flown, item, summary.spread) for item in summary.quantiles if item.probability in shown]
         used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
         rows.append((Cell(axis_label(flown.words(name), flown.unit(name))), used, *cells))
     each = given_percent(flown.stated.confidence)

@@ -16,9 +16,9 @@ MOST_DIGITS = 8  # of one number in a table
 MOST_GIVEN = 14  # of a limit that somebody wrote; more are of a conversion
 LONGEST_SYMBOL = 3  # letters
 LONGEST_LABEL = 44  # letters of an axis label, without its unit
+SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _ROUNDING = 1e-12  # of the size of two numbers: closer ones count as equal
 _NEGLIGIBLE = 1e-6  # of a spread
-_SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
 def count(number: int) -> str:
@@ -90,7 +90,7 @@ def _significant(value: float, digits: int, up: bool | None = None) -> str:
 
 
 def _power(mantissa: str, exponent: int) -> str:
-    return f"{mantissa}·10{str(exponent).translate(_SUPERSCRIPT)}".replace("-", "−")
+    return f"{mantissa}·10{str(exponent).translate(SUPERSCRIPT)}".replace("-", "−")
 
 
 def column_texts(values: Sequence[float | None]) -> list[str]:
@@ -225,4 +225,4 @@ def typeset(unit: str) -> str:
 
 
 def _raised(text: str) -> str:
-    return re.sub(r"\^(\d+)(?!\w)", lambda power: power[1].translate(_SUPERSCRIPT), text)
+    return re.sub(r"\^(\d+)(?!\w)", lambda power: power[1].translate(SUPERSCRIPT), text)
