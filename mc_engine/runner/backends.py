@@ -106,11 +106,11 @@ def memory_can_be_limited() -> bool:
 _FIRST_TRIAL, _LONG_ENOUGH = 1024, 0.25  # cases; s: to begin threads takes some milliseconds
 
 
-def measure_card(campaign: Campaign, n_cases: int | None = None, repeats: int = 3) -> tuple[float, float]:
+def measure_card(campaign: Campaign, n_cases: int | None = None) -> tuple[float, float]:
     """Cases per second on all cores of the processor and on a card, which the backend "auto" goes by from now on.
 
     n_cases : of a flight; by default so many that all cores fly for a while, or all cases of a design that has no more.
-    The fastest of `repeats` flights counts.  Raises EngineError, one sentence, where there is no card.
+    The fastest of three flights counts.  Raises EngineError, one sentence, where there is no card.
     """
     from mc_engine.runner.cards import CardFlyer
 
@@ -127,7 +127,7 @@ def measure_card(campaign: Campaign, n_cases: int | None = None, repeats: int = 
     cases = most if n_cases else min(_FIRST_TRIAL, most)
     while cases < most and seconds(on_processor, cases, 1) < _LONG_ENOUGH:
         cases = min(2 * cases, most)
-    processor, card = (cases / seconds(flyer, cases, repeats) for flyer in (on_processor, on_card))
+    processor, card = (cases / seconds(flyer, cases, 3) for flyer in (on_processor, on_card))
     with disk_errors(file):
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps({"processor_cases_s": processor, "card_cases_s": card}), encoding="utf-8")

@@ -53,8 +53,8 @@ class Tuned:
     def label(self, name: str) -> str:
         return axis_label(words(name, self.units[name]), self.units[name])
 
-    def with_unit(self, name: str, value: float, digits: int = 4) -> str:
-        return with_unit(number(value, digits), self.units[name])
+    def with_unit(self, name: str, value: float) -> str:
+        return with_unit(number(value, 4), self.units[name])
 
 
 def inside(values: np.ndarray, constraint: Mapping[str, Any]) -> np.ndarray:
