@@ -97,32 +97,38 @@ class ShownRun(Flown):
             unit = self._own.unit(name)
             role = self._own.columns[name].role if name in self._own.columns else ""
             kept = role == "dispersion" or self._fine(name, unit)
-            self._units[name] = unit if kept else chosen_unit(unit, self._sizes(name))
+            self._units[name] = unit if kept else self._chosen(name, unit)
         return self._units[name]
+
+    def _chosen(self, name: str, unit: str) -> str:
+        """The unit for all numbers of a column.  A metric that is an output, too, keeps its own unless both agree:
+        a miss of 3 m is not told in km because the flight begins 480 km away."""
+        found = {chosen_unit(unit, sizes) for sizes in self._sizes(name)}
+        return found.pop() if len(found) == 1 else unit
 
     def _fine(self, name: str, unit: str) -> bool:
         """Whether a larger unit would hide how far a metric spreads, and is from its limits: 1 s after 6 hours."""
         summary = self._own.summaries.get(name)
         if summary is None or not summary.spread or summary.mean is None:
             return False
-        chosen = chosen_unit(unit, self._sizes(name))
+        chosen = self._chosen(name, unit)
         apart = [abs(limit - summary.mean) for limit in self._own.limits(name) if limit is not None]
         return chosen != unit and convert(max([summary.spread, *apart]), unit, chosen) < FINE
 
-    def _sizes(self, name: str) -> list[float | None]:
-        """What the numbers of a column come to, in the table and in the histories, and its limits."""
-        sizes = [*self._own.limits(name), self._own.nominal_value(name)]
-        tables = [self._own.histories]
+    def _sizes(self, name: str) -> list[list[float | None]]:
+        """What the numbers of a column come to: of a metric with its limits, and of a state or an output."""
+        found: list[list[float | None]] = []
         if name in self._own.summaries:
             summary = self._own.summaries[name]
-            sizes += [quantile.value for quantile in summary.quantiles] or [summary.minimum, summary.maximum]
-        else:
-            tables.append(self._own.cases)
-        for table in tables:
+            ends = [summary.minimum, summary.maximum]
+            percentiles = [quantile.value for quantile in summary.quantiles]
+            found.append([*self._own.limits(name), self._own.nominal_value(name), *(percentiles or ends)])
+        largest: list[float | None] = []
+        for table in [self._own.histories] if found else [self._own.histories, self._own.cases]:
             if name in table.columns and pd.api.types.is_numeric_dtype(table[name]):
                 values = np.abs(table[name].to_numpy(dtype=np.float64))
-                sizes.append(float(values[np.isfinite(values)].max(initial=0.0)))
-        return sizes
+                largest.append(float(values[np.isfinite(values)].max(initial=0.0)))
+        return [*found, largest] if largest else found
 
     def told(self, name: str, value: Any) -> Any:
         """A number, or an array of them, of a column's own unit in the unit chosen for it; None stays None."""

@@ -74,6 +74,13 @@ def test_a_metric_has_one_unit_on_all_pages_and_on_the_axes(slow):
     assert "time [days]" in axes
 
 
+def test_a_small_metric_keeps_its_unit_though_the_output_of_its_name_is_large_in_flight(slow):
+    run = dataclasses.replace(slow, history=slow.history.assign(settling_time_s=9e5))
+    assert ShownRun(Flown(run, "run")).unit("settling_time_s") == "day"  # both ask for it
+    run.history["settling_time_s"] = 9.0
+    assert ShownRun(Flown(run, "run")).unit("settling_time_s") == "s"
+
+
 def test_a_limit_close_to_large_values_keeps_its_digits():
     """A range of 1e9 m that may be exceeded by 4 mm: in km, limit and values would all read 1 000 000 km."""
     run = synthetic_run(2000, failed=0)
