@@ -5,7 +5,7 @@ from dataclasses import astuple
 
 import numpy as np
 
-from mc_engine.numbers_in_text import counted
+from mc_engine.numbers_in_text import counted, percent_digits
 from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, finite, hidden_by_ties
 from mc_engine.studies.comparison import Comparison
 from mc_engine.studies.run_changes import changed_lines
@@ -77,6 +77,9 @@ def _metric_table(comparison: Comparison) -> Iterator[str]:
     for row in rows if len(rows) > 1 else []:
         cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
         yield "  ".join(cells).rstrip()
+    if len(rows) > 1:
+        sure = percent_digits(comparison.confidence)
+        yield f"in brackets: {sure} % intervals, each by itself; p-values are adjusted for all tests together"
     if any(_TIES in row for row in rows):
         yield f"{_TIES}: so many cases have equal values that the size of a significant change is hidden; see --report"
     if same:

@@ -203,6 +203,7 @@ def test_intervals_have_the_confidence_of_the_second_report_and_metrics_need_one
     b = run(tmp_path / "b", columns=other, report={"confidence": 0.99})
     found = compared(run(tmp_path / "a", report={"confidence": 0.6}), b)
     assert found.confidence == 0.99
+    assert any(line.startswith("in brackets: 99 % intervals") for line in comparison_lines(found))
     assert [one.metric for one in found.metrics] == ["propellant_kg", "pulses"]
     assert found.left_out == ("range_m: in m in A, in km in B",)
 
