@@ -3,18 +3,27 @@
 `contributors` ranks the inputs of a metric by them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import scipy  # loads its packages when they are used
 
-from mc_engine.statistics.input_columns import InputColumn, equal_bins, finite_rows, input_columns
+from mc_engine.statistics.input_columns import (
+    InputColumn,
+    beyond_chance,
+    equal_bins,
+    finite_rows,
+    input_columns,
+    rank_correlations,
+)
 
 MOST_BINS = 100
 FEWEST_CASES = 20
 MOST_CASES = 20_000  # above, so many are picked evenly
 _ROUNDING = 1e-24  # of a bin's variance: what remains of equal values
+_SURE = 3.0  # standard errors
+_LEFT = 1e-9  # of a metric's standard deviation: what rounding leaves where the other inputs explain all
 
 
 def first_order(column: InputColumn, table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -26,11 +35,50 @@ def first_order(column: InputColumn, table: np.ndarray) -> tuple[np.ndarray, np.
     226 (2013), 536-550.  Without the lines, what a metric changes within the wide outer bins would count as noise.
     The error is that of the influence function of the ratio of the two variances, too large at an index of 0.
     """
-    n = len(table)
+    share, error, _ = _by_bins(column, standardised(table))
+    return share, error
+
+
+def first_orders(columns: Sequence[InputColumn], table: np.ndarray, sobol: bool) -> tuple[np.ndarray, np.ndarray]:
+    """The same of several inputs, float64[n_columns, n_metrics].  sobol : the cases are Sobol' points.
+
+    In a bin of one input, Sobol' points do not hold the other inputs evenly, so that the bins of an input without
+    effect show that of another one: up to 0.4 of the variance with 2048 points of ten inputs.  What the bins of the
+    inputs explain, the strongest first, is taken off the metric therefore before another input that is not correlated
+    with them; a second round does so for the strongest, too.  The errors stay those of independent cases, which are
+    larger than the scatter of Sobol' points.
+    """
+    shape = (len(columns), table.shape[1])
+    alone = [first_order(column, table) for column in columns]
+    share, error = (np.reshape([one[part] for one in alone], shape) for part in (0, 1))
+    if not sobol:
+        return share, error
+    correlated = beyond_chance(rank_correlations(columns), len(table))
+    for metric, values in enumerate(standardised(table).T):
+        explained: dict[int, np.ndarray] = {}
+        strongest = np.argsort(-np.nan_to_num(share[:, metric], nan=-1.0))
+        for k in [*strongest, *strongest]:
+            explained.pop(k, None)
+            left = values - sum(part for other, part in explained.items() if not correlated[k, other])
+            size = left.std()
+            if not size > _LEFT:
+                share[k, metric] = 0.0
+                continue
+            one, its_error, fitted = _by_bins(columns[k], standardised(left[:, None]))
+            share[k, metric] = one[0] * size**2
+            if one[0] > _SURE * its_error[0]:
+                explained[k] = fitted[:, 0] * size
+    return share, error
+
+
+def _by_bins(column: InputColumn, centred: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Index and standard error per metric (mean 0, variance 1), and what the bins explain of each case."""
+    n = len(centred)
+    nothing = np.full(centred.shape[1], np.nan)
     index, bins = equal_bins(column, min(max(int(0.7 * np.sqrt(n)), 2), MOST_BINS))
     if bins < 2:
-        return np.full(table.shape[1], np.nan), np.full(table.shape[1], np.nan)
-    centred, place = standardised(table), standardised(column.values[:, None])[:, 0]
+        return nothing, nothing, np.zeros_like(centred)
+    place = standardised(column.values[:, None])[:, 0]
     members = scipy.sparse.csr_array((np.ones(n), (index, np.arange(n))), shape=(bins, n))
     size = members.sum(axis=1)
     mean = (members @ centred) / size[:, None]
@@ -39,13 +87,13 @@ def first_order(column: InputColumn, table: np.ndarray) -> tuple[np.ndarray, np.
     sloped = (width > _ROUNDING * size) & (not column.levels)
     parameters = bins + int(np.count_nonzero(sloped))
     if n <= 2 * parameters:
-        return np.full(table.shape[1], np.nan), np.full(table.shape[1], np.nan)
+        return nothing, nothing, np.zeros_like(centred)
     slope = np.where(sloped, 1.0 / np.where(sloped, width, 1.0), 0.0)[:, None] * (members @ (off[:, None] * centred))
     fitted = mean[index] + off[:, None] * slope[index]
     inside = centred - fitted
     share = 1.0 - (inside**2).sum(axis=0) / (n - parameters) * (n - 1) / n
     influence = fitted**2 + 2.0 * fitted * inside - share * centred**2
-    return share, influence.std(axis=0) / np.sqrt(n)
+    return share, influence.std(axis=0) / np.sqrt(n), fitted
 
 
 def standardised(table: np.ndarray) -> np.ndarray:
@@ -65,10 +113,11 @@ class Contributor(NamedTuple):
     share: float
 
 
-def contributors(inputs: Mapping[str, Any], values: np.ndarray) -> list[Contributor]:
+def contributors(inputs: Mapping[str, Any], values: np.ndarray, sobol: bool = False) -> list[Contributor]:
     """The inputs that differ between the cases, the strongest contributor first; of too few cases in their own order.
 
     inputs : numbers, switches or words, by name;  values : float64[n], the metric, NaN for a case without a number.
+    sobol : the cases are Sobol' points.
     """
     columns = input_columns(inputs)
     rows = np.flatnonzero(np.isfinite(values) & finite_rows(columns, len(values)))
@@ -77,5 +126,6 @@ def contributors(inputs: Mapping[str, Any], values: np.ndarray) -> list[Contribu
     table = np.asarray(values, dtype=np.float64)[rows, None]
     if rows.size < FEWEST_CASES or not np.ptp(table) > 1e-12 * np.abs(table).max():
         return [Contributor(column.name, np.nan) for column in live]
-    shares = [Contributor(column.name, float(first_order(column, table)[0][0])) for column in live]
+    found = first_orders(live, table, sobol)[0][:, 0]
+    shares = [Contributor(column.name, float(share)) for column, share in zip(live, found, strict=True)]
     return sorted(shares, key=lambda contributor: -np.nan_to_num(contributor.share, nan=-1.0))

@@ -73,6 +73,22 @@ def average_ranks(values: np.ndarray) -> np.ndarray:
     return ranks
 
 
+def rank_correlations(columns: Sequence[InputColumn]) -> np.ndarray:
+    """Spearman's correlation of each two inputs, float64[n_columns, n_columns]; 0 of a group and of itself."""
+    found = np.zeros((len(columns), len(columns)))
+    usable = [k for k, column in enumerate(columns) if column.ordered and column.varies]
+    if len(usable) > 1:
+        ranks = average_ranks(np.column_stack([columns[k].values for k in usable]))
+        found[np.ix_(usable, usable)] = np.corrcoef(ranks, rowvar=False)
+        np.fill_diagonal(found, 0.0)
+    return found
+
+
+def beyond_chance(rank_correlation: Any, n_cases: int) -> Any:
+    """Whether two inputs are correlated, and not so by chance: five standard errors of a correlation of nothing."""
+    return abs(rank_correlation) > max(5.0 / np.sqrt(n_cases), 0.05)
+
+
 def equal_bins(column: InputColumn, bins: int) -> tuple[np.ndarray, int]:
     """Bin of each case (int64[n]) and the number of bins: about equally full, ties together, no bin empty.
 

@@ -24,8 +24,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mc_engine.statistics.first_order import first_order, standardised
-from mc_engine.statistics.input_columns import InputColumn, average_ranks, finite_rows, input_columns
+from mc_engine.statistics.first_order import first_orders, standardised
+from mc_engine.statistics.input_columns import InputColumn, average_ranks, beyond_chance, finite_rows, input_columns
 from mc_engine.statistics.moments import near_one
 from mc_engine.statistics.total_order import FEWEST_CASES as FEWEST_OF_TOTALS
 from mc_engine.statistics.total_order import total_order
@@ -70,8 +70,10 @@ class _Fit(NamedTuple):
     r_squared: np.ndarray
 
 
-def sensitivity(inputs: Mapping[str, Any], metrics: Mapping[str, np.ndarray]) -> Sensitivity:
+def sensitivity(inputs: Mapping[str, Any], metrics: Mapping[str, np.ndarray], *, sobol: bool = False) -> Sensitivity:
     """Indices of every input and metric.  inputs : numbers, switches or words; metrics : float64[n], NaN where none.
+
+    sobol : the cases are Sobol' points.
 
     A case counts for a metric if it has a number there and in all inputs.  A group of more than two words has only a
     first-order index, and is held constant in the regressions.
@@ -95,13 +97,8 @@ def sensitivity(inputs: Mapping[str, Any], metrics: Mapping[str, np.ndarray]) ->
             where = np.flatnonzero(pattern == group)
             rows = np.flatnonzero(used[:, where[0]])
             part, _ = near_one(table[np.ix_(rows, where)])
-            _fill(indices, [column.at(rows) for column in columns], part, where, independent)
+            _fill(indices, [column.at(rows) for column in columns], part, where, independent, sobol)
     return Sensitivity(tuple(inputs), names, n_used, int(tried), correlated=strongest, **indices)
-
-
-def beyond_chance(rank_correlation: float, n_cases: int) -> bool:
-    """Whether two inputs are correlated, and not so by chance: five standard errors of a correlation of nothing."""
-    return abs(rank_correlation) > max(5.0 / np.sqrt(n_cases), 0.05)
 
 
 def _fill(
@@ -110,6 +107,7 @@ def _fill(
     table: np.ndarray,
     where: np.ndarray,
     independent: bool,
+    sobol: bool,
 ) -> None:
     """The indices of the metrics at `where`, whose numbers `table` (float64[n_used, len(where)]) holds, all finite."""
     n = len(table)
@@ -118,12 +116,12 @@ def _fill(
     if not live or not moving.any():
         return
     varying, where = table[:, moving], where[moving]
-    for k in live:
-        indices["first_order"][k, where], indices["first_order_error"][k, where] = first_order(columns[k], varying)
+    alive = np.ix_(np.array(live), where)
+    moved = [columns[k] for k in live]
+    indices["first_order"][alive], indices["first_order_error"][alive] = first_orders(moved, varying, sobol)
     if independent and n >= FEWEST_OF_TOTALS:
-        alive = np.ix_(np.array(live), where)
         indices["total"][alive], indices["total_error"][alive], indices["unexplained"][where] = total_order(
-            [columns[k] for k in live], varying
+            moved, varying
         )
     ordered = [k for k in live if columns[k].ordered]
     if not ordered:

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from mc_engine.statistics.input_columns import beyond_chance
 from mc_engine.statistics.moments import number_or_none
-from mc_engine.statistics.sensitivity import FEWEST_CASES, FEWEST_OF_TOTALS, Sensitivity, beyond_chance
+from mc_engine.statistics.sensitivity import FEWEST_CASES, FEWEST_OF_TOTALS, Sensitivity
 from reports.contributors.tornado_figure import STRONGEST, contributor_figure, name_of, strongest
 from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.run.chosen_units import spread_text

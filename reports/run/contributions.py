@@ -151,6 +151,7 @@ def _of_table(flown: "Flown", metrics: list[str]) -> Contributions | None:
     indices = sensitivity(
         {name: values[rows] for name, values in inputs.items()},
         {name: flown.values(name)[rows] for name in metrics},
+        sobol=flown.design == "sobol",
     )
     shares = ((indices.first_order, indices.first_order_error), (indices.total, indices.total_error))
     by_metric = {}

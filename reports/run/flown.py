@@ -329,7 +329,7 @@ class Flown:
         """The dispersed inputs that vary, the one that contributes most to the metric first."""
         if metric not in self._contributors:
             self._contributors[metric] = self._flown_contributors(metric) or contributors(
-                self.inputs, self.values(metric)
+                self.inputs, self.values(metric), self.design == "sobol"
             )
         return self._contributors[metric]
 

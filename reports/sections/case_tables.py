@@ -93,7 +93,7 @@ def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFr
     Without a metric the inputs are those that contribute most to being inside all limits.
     """
     inside_of = inside(flown).astype(np.float64)
-    ranked = flown.contributors(metric) if metric else contributors(flown.inputs, inside_of)
+    ranked = flown.contributors(metric) if metric else contributors(flown.inputs, inside_of, flown.design == "sobol")
     ranked = ranked or [Contributor(name, np.nan) for name in flown.inputs]
     shown = [flown.columns[contributor.name] for contributor in ranked[:INPUTS_SHOWN]]
     columns = [Column("Case", "number")]

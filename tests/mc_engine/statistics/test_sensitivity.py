@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from scipy.stats import rankdata, spearmanr
 
+from mc_engine.sampling.designs import unit_cube
 from mc_engine.sampling.streams import uniforms
 from mc_engine.statistics.first_order import contributors, first_order
-from mc_engine.statistics.input_columns import input_columns
-from mc_engine.statistics.sensitivity import beyond_chance, sensitivity
+from mc_engine.statistics.input_columns import beyond_chance, input_columns
+from mc_engine.statistics.sensitivity import sensitivity
 
 N = 2**13
 
@@ -164,3 +165,26 @@ def test_a_number_of_few_values_is_as_good_as_their_names():
     (table,) = (np.sin(5.0 * values) + noise)[None, :, None]
     by_value, by_name = (first_order(*input_columns({"x": x}), table) for x in (values, names))
     assert by_value[0] == pytest.approx(by_name[0], rel=1e-12)
+
+
+@pytest.mark.parametrize(("n", "count"), [(1000, 24), (2048, 10)])
+def test_inputs_without_effect_have_no_first_order_index_among_sobol_points(n, count):
+    names = [f"x{k}" for k in range(count)]
+    points = dict(zip(names, unit_cube("sobol", 1, names, np.arange(n), n), strict=True))
+    waves = {name: np.cos(2.0 * np.pi * points[name]) + 0.5 * points["x0"] for name in names[1:]}
+    found = sensitivity(points, waves, sobol=True).first_order
+    wave, line = 0.5 / (0.5 + 0.25 / 12.0), 0.25 / 12.0 / (0.5 + 0.25 / 12.0)
+    true = np.vstack([np.full(count - 1, line), wave * np.eye(count - 1)])
+    assert np.abs(found - true).max() < 0.03
+    by_bins = sensitivity(points, waves).first_order  # those of the bins alone
+    assert (by_bins - true).max() > 0.1
+    assert contributors(points, waves["x3"], sobol=True)[0].name == "x3"
+
+
+def test_a_correlated_input_keeps_what_it_owes_to_its_correlation_among_sobol_points():
+    n = 2048
+    a, b = unit_cube("sobol", 1, ["a", "b"], np.arange(n), n, (("a", "b", 0.7),))
+    (first, second) = sensitivity({"a": a, "b": b}, {"y": a}, sobol=True).first_order[:, 0]
+    assert first == pytest.approx(1.0, abs=1e-3)
+    assert second > 0.4
+    assert second == pytest.approx(sensitivity({"a": a, "b": b}, {"y": a}).first_order[1, 0])
