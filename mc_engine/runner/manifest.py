@@ -64,6 +64,7 @@ def manifest_of(campaign: Campaign) -> dict[str, Any]:
             "sampling_digest": sampling_digest(),
         },
         "inputs": [*_upstream_inputs(campaign), *dispersion_records(campaign)],
+        "correlations": [asdict(pair) for pair in campaign.correlations],
         **_constant_inputs(campaign),
         "quantities": [_description(quantity) for quantity in model.quantities],
         "ranges": _ranges(campaign.model),

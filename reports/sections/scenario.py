@@ -9,7 +9,8 @@ from reports.run.chosen_units import spread_text
 from reports.run.flown import Flown
 from reports.run.phases import phase_times
 from reports.sections.tables import fixed_table, input_table
-from reports.text.numbers import counted, number, with_unit
+from reports.text.numbers import counted, exact, number, with_unit
+from reports.text.source_places import of_source
 
 EVENTS = ("time of ", "start of ", "end of ")  # how the meaning of an event's time begins
 DESIGNS = {
@@ -34,6 +35,7 @@ def scenario_blocks(flown: Flown) -> Iterator[Table | str | None]:
         yield "All parameters and settings that are not dispersed have the model’s own values (appendix Inputs)."
     yield changed
     yield input_table(flown) or "No input is dispersed: all cases have the nominal inputs."
+    yield correlation_table(flown)
 
 
 def _vehicle(flown: Flown) -> str:
@@ -53,6 +55,21 @@ def _vehicle(flown: Flown) -> str:
 
 def _design_words(flown: Flown) -> str:
     return f" ({DESIGNS[flown.design]})" if flown.design in DESIGNS else ""
+
+
+def correlation_table(flown: Flown) -> Table | None:
+    """The pairs of dispersed inputs that the campaign file correlates; None without any."""
+    rows = [
+        (
+            Cell(f"{pair['first']}, {pair['second']}"),
+            Cell(exact(pair["rank"]), pair["rank"]),
+            Cell(of_source(pair["source"] or "not stated")),
+        )
+        for pair in flown.manifest.get("correlations", [])
+    ]
+    columns = (Column("Inputs", "name"), Column("Rank correlation", "number"), Column("Source", "text"))
+    note = "Spearman’s rank correlations of the draws, as the campaign file sets them or from its covariances."
+    return Table("Correlated inputs", columns, tuple(rows), note) if rows else None
 
 
 def timeline_table(flown: Flown) -> Table | None:

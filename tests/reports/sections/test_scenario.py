@@ -5,6 +5,8 @@ import pytest
 from figure_marks import FORMS, marks_of
 from synthetic_run import synthetic_run
 
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.runner.manifest import manifest_of
 from reports.contents import build
 from reports.document.blocks import FigureBlock, Table
 from reports.drawing.marks import Limit, Points
@@ -63,8 +65,18 @@ def test_assumptions_are_what_the_campaign_file_sets_and_the_rest_is_in_the_appe
     scenario = {one.caption: one for one in section(run, "scenario").blocks if isinstance(one, Table)}
     assert [row[0].text for row in scenario["Assumptions: values set by the campaign file"].rows] == ["isp_s"]
     assert [row[0].text for row in scenario["Dispersed inputs"].rows] == ["ve_pct [%]", "oe_pct [%]"]
+    assert "Correlated inputs" not in scenario
     (fixed,) = section(run, "inputs").blocks
     assert [row[0].text for row in fixed.rows] == ["gain_1_s", "control"]
+
+
+def test_inputs_that_the_campaign_correlates_are_named_with_rank_and_source():
+    run = synthetic_run(50, failed=0)
+    run.manifest["correlations"] = manifest_of(load_campaign("geo_injection/parking_orbit_errors"))["correlations"]
+    (table,) = [one for one in section(run, "scenario").blocks if getattr(one, "caption", "") == "Correlated inputs"]
+    pair, rank, source = (cell.text for cell in table.rows[0])
+    assert (pair, rank) == ("initial_position_t_m, initial_velocity_r_m_s", "−0.8915")
+    assert source == "not stated"
 
 
 def test_without_figures_of_its_own_a_model_gets_histories_and_scatters_of_what_matters():
