@@ -85,12 +85,17 @@ def _refuse_false_numbers(system: "System") -> None:
         _refuse_name(item)
         _refuse_swapped(item)
     names, outputs = [item.name for item in (*inputs, *system.metrics)], [item.name for item in system.quantities]
-    columns = [*names, *(f"end_{state.name}" for state in system.states)]
+    ends = [f"end_{state.name}" for state in system.states]
+    columns = [*names, *ends]
     _refuse_taken("column", names, _CASE_COLUMNS)
     _refuse_taken("output", outputs, _HISTORY_COLUMNS)
     if getattr(system, "phases", ()):
         _refuse_taken("column", columns, ("end_phase",))
         _refuse_taken("output", outputs, ("phase",))
+    for name in names:
+        if name in ends:
+            state = name.removeprefix("end_")
+            raise ModelError(f'the column "{name}" is that of the state "{state}" at the end; take another name')
     _refuse_twice("column", columns)
     _refuse_twice("output", outputs)
     for setting in system.settings:

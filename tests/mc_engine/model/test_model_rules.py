@@ -42,6 +42,8 @@ CONTRADICTIONS = {
                                       '"case_id" has the unit "m/s", so that its name must end in "_m_s"'),
     "a column of the engine's": (*with_evaluate("State(end_time=t)"), ("top_speed_m_s", "end_time_s"),
                                  'the column "end_time_s" has the name of a column that every table has'),
+    "a state at the end": (("top_speed_m_s", "end_vx_m_s"),
+                           'the column "end_vx_m_s" is that of the state "vx_m_s" at the end'),
     "an output of the engine's name": (('speed_m_s="speed")', 'speed_m_s="speed", t_s="time")'),
                                        'the output "t_s" has the name of a column that every table has'),
     "parameters of no record": (given("kernel_parameters=dict"), "kernel_parameters must be a named tuple, whose"),
