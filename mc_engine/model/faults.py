@@ -196,7 +196,8 @@ def is_the_users(path: Path) -> bool:
 
 def wrong_record(error: BaseException) -> str:
     """What is wrong with the arguments that a record or a declaration, such as a Field, is made with; "" for others."""
-    call = re.match(r"(\w+)(?:\.__(?:init|new)__)?\(\) (.*)", str(error))
+    said = re.sub(r"\. Did you mean '\w+'\?$", "", str(error))  # of Python from 3.13 on
+    call = re.match(r"(\w+)(?:\.__(?:init|new)__)?\(\) (.*)", said)
     if not isinstance(error, TypeError) or not call:
         return ""
     *_, (frame, _) = walk_tb(error.__traceback__)

@@ -243,11 +243,13 @@ def _with_stop(function: Any, line: int, is_due: Callable[[str], bool]) -> Any:
         return function
     own = deepcopy(definition)
     own.decorator_list = []
-    body, index = _position(own.body, line) if line else (own.body, 0)
+    body, index = _position(own.body, line) if line else (own.body, int(ast.get_docstring(own) is not None))
     stop = ast.parse("if __is_due__(): __breakpoint__()").body[0]
-    for node in ast.walk(stop):  # a line of its own, above the function: a debugger shows the frame at the next
+    # a debugger shows the line of the call; before Python 3.13 the next, so that the call has one above the function
+    shown = body[index].lineno if sys.version_info >= (3, 13) and index < len(body) else max(own.lineno - 1, 1)
+    for node in ast.walk(stop):
         if isinstance(node, ast.stmt | ast.expr):
-            node.lineno = node.end_lineno = max(own.lineno - 1, 1)
+            node.lineno = node.end_lineno = shown
     body.insert(index, stop)
     given = {"__is_due__": partial(is_due, function.__name__), "__breakpoint__": builtins.breakpoint}
     given |= {
