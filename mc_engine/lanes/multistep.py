@@ -26,13 +26,14 @@ from mc_engine.lanes import extrema
 from mc_engine.lanes.adaptive_step import attempt
 from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.fixed_step import LOOKS, grid_time, last_above, newest_twice, track_by_three
-from mc_engine.lanes.functions import any_lane, replace, where
+from mc_engine.lanes.functions import any_lane, minimum, replace, where
 from mc_engine.lanes.physics_function import physics
 from mc_engine.lanes.runge_kutta_pairs import DOP853, LARGEST_STAGES
 from mc_engine.lanes.stage_memory import put_stage, stage_memory, stage_sum, take_stage
 from mc_engine.lanes.tuples import add_scaled, any_field, map_fields, select, spread
 
 _ITERATIONS = 3  # of Newton's method between two looks, from a parabola or a chord
+_FADED = 0.25  # the last two differences, over those before: 0.24 at 7.5 steps a turn, more beside a jump or a corner
 
 # differences : of neighbouring slopes at the last grid points, in a ring;  newest : index of the last in it
 # slope : at the last grid point;  known : how many slopes belong to the present motion, of each lane
@@ -234,6 +235,30 @@ def _interpolate(differences, count, x):
 interpolate = compile_callable(_interpolate)
 
 
+@physics
+def _sum_of_sizes(total, difference, mask):
+    return total + where(mask, abs(difference), 0.0)
+
+
+@physics
+def _smooth_where_faded(smooth, before, last):
+    return where(last <= _FADED * before, smooth, 0.0)
+
+
+def _smooth_of_differences(differences, count, smooth):
+    """`smooth` of outputs whose differences fade with their order; 0 where a jump or a corner is among the looks."""
+    n = minimum(count, float(LOOKS))
+    before = last = map_fields(_none, smooth)
+    for order in range(2, LOOKS):
+        difference, late = take_stage(differences, order, smooth), n <= float(order + 2)
+        before = map_fields(_sum_of_sizes, before, difference, not late)
+        last = map_fields(_sum_of_sizes, last, difference, late & (n > float(order)))
+    return map_fields(_smooth_where_faded, smooth, before, last)
+
+
+smooth_of_differences = compile_callable(_smooth_of_differences)
+
+
 def _search_crest(looks, newest, back, t, h, count, lanes, smooth, best, when):
     """(best, when) with the crests beside the look that is `back` steps before the newest, at t."""
     place, newer, older = (newest - back) % LOOKS, (newest - max(back - 1, 0)) % LOOKS, (newest - back - 1) % LOOKS
@@ -286,6 +311,7 @@ def _search(looks, number, t, h, count, closing, lanes, smooth, best, when, last
     """
     newest, nearest = number % LOOKS, 0 if closing else 1
     form_differences(looks.peaks, looks.peak_differences, newest, best)
+    smooth = smooth_of_differences(looks.peak_differences, count, smooth)
     everywhere = lanes & ((count < float(LOOKS)) if closing else (count == float(LOOKS)))
     for i in range(LOOKS - nearest):
         back = LOOKS - 1 - i
@@ -313,9 +339,12 @@ def _track_by_all(looks, number, t, h, closing, lanes, count, smooth, seen, last
     place = number % LOOKS
     put_stage(looks.peaks, place, select(lanes, seen[4], take_stage(looks.peaks, place, best)))
     put_stage(looks.lasts, place, select(lanes, lasts[1], take_stage(looks.lasts, place, last)))
-    # around the end of a motion three looks have to do
-    corner, v1, v2, v3 = map_fields(_at_corner, smooth, count < 3.0), seen[2], seen[3], seen[4]
-    best, when = track_by_three(number, t, h, True, lanes, corner, newest_twice(seen), best, when)
+    # around the end of a motion the parabola has to do, one look later, when five tell of a jump
+    corner, v1, v2, v3 = map_fields(_at_corner, smooth, looks.count < 3.0), seen[2], seen[3], seen[4]
+    best, when = track_by_three(number, t, h, False, lanes, corner, seen, best, when)
+    if closing:
+        corner = map_fields(_at_corner, smooth, count < 3.0)
+        best, when = track_by_three(number, t, h, True, lanes, corner, newest_twice(seen), best, when)
     last = last_above(number, t, h, lanes, lanes & (count < 2.0), lasts, last)
     crests = any_field(map_fields(_smooth_crest, v1, v2, v3, best, smooth))
     falls = any_field(map_fields(extrema.falls, lasts[0], lasts[1], lanes))

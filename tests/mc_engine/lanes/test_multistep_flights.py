@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from flown_models import FOLDER, OSCILLATOR, RAIL, flown, inputs_of, same_bytes
+from flown_models import CORNERS, FOLDER, OSCILLATOR, RAIL, flown, inputs_of, same_bytes
 from plain_steps import MIXED, by
 
 from mc_engine.flight.flight import fly_history, fly_interpreted
@@ -106,6 +106,18 @@ def test_extremes_beside_samples_of_the_control_are_searched_on_the_motion_befor
     assert error.max() < 4e-6
     for width in (1, 16):
         same_bytes(columns, flown(by(OSCILLATOR, "abm11"), width=width, **{**SWINGS, "every": 5.0}, step_s=0.1))
+
+
+def test_a_corner_or_a_jump_among_the_looks_makes_no_extreme_of_the_polynomial():
+    columns = flown(by(CORNERS, "abm8"), phase_rad=np.linspace(0.0, 6.28, 200))
+    for name in ("lit", "relay"):  # by the polynomial up to 2.3, by a parabola that ends at the jump 1.25
+        np.testing.assert_array_equal(columns[f"{name}_top"], 1.0)
+        np.testing.assert_array_equal(columns[f"{name}_bottom"], 0.0 if name == "lit" else -1.0)
+    over = columns["limited_top"] - 1.0  # by the polynomial up to 0.08; by chance the looks tell of no corner
+    assert over.min() == 0.0
+    assert np.mean(over > 0.0) < 0.03
+    assert over.max() < 0.005
+    np.testing.assert_allclose(columns["wave_top"], 2.0, rtol=1e-6)
 
 
 def test_a_crest_before_a_sample_is_the_same_beside_a_case_that_ends_in_that_step():

@@ -13,6 +13,7 @@ Outputs = outputs(
     relay=Field("sign of the wave at the sample", unit=""),
     saw=Field("phase since the sign last changed", unit=""),
     wave=Field("wave", unit=""),
+    lit=Field("1 while the wave is positive, else 0", unit=""),
 )
 Metrics = metrics(
     limited_top=maximum_of("limited", unit=""),
@@ -20,6 +21,8 @@ Metrics = metrics(
     relay_bottom=minimum_of("relay", unit=""),
     saw_top=maximum_of("saw", unit=""),
     wave_top=maximum_of("wave", unit=""),
+    lit_top=maximum_of("lit", unit=""),
+    lit_bottom=minimum_of("lit", unit=""),
 )
 
 
@@ -42,7 +45,8 @@ def control(s, m):
 @physics
 def observe(s, m):
     wave = 2.0 * sin(s.x)
-    return Outputs(limited=minimum(wave, 1.0), relay=m.relay, saw=s.x - m.began, wave=wave)
+    lit = where(wave > 0.0, 1.0, 0.0)
+    return Outputs(limited=minimum(wave, 1.0), relay=m.relay, saw=s.x - m.began, wave=wave, lit=lit)
 
 
 MODEL = model(name="corners", title="Corners and jumps", inputs=Inputs, states=State, outputs=Outputs, metrics=Metrics,
