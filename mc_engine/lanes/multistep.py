@@ -33,7 +33,9 @@ from mc_engine.lanes.stage_memory import put_stage, stage_memory, stage_sum, tak
 from mc_engine.lanes.tuples import add_scaled, any_field, map_fields, select, spread
 
 _ITERATIONS = 3  # of Newton's method between two looks, from a parabola or a chord
-_FADED = 0.25  # the last two differences, over those before: 0.24 at 7.5 steps a turn, more beside a jump or a corner
+# The most that the last two differences of an output may be, over those before: 0.24 at 7.5 steps a turn, more beside a
+# jump or a corner.  Of few looks the last one only, over so much for each before; of four, none tells of a short pulse.
+_FEW, _FADED, _FADED_OF_FEW = 6.0, 0.25, 0.9
 
 # differences : of neighbouring slopes at the last grid points, in a ring;  newest : index of the last in it
 # slope : at the last grid point;  known : how many slopes belong to the present motion, of each lane
@@ -241,19 +243,21 @@ def _sum_of_sizes(total, difference, mask):
 
 
 @physics
-def _smooth_where_faded(smooth, before, last):
-    return where(last <= _FADED * before, smooth, 0.0)
+def _smooth_where_faded(smooth, before, last, most):
+    return where(last <= most * before, smooth, 0.0)
 
 
 def _smooth_of_differences(differences, count, smooth):
     """`smooth` of outputs whose differences fade with their order; 0 where a jump or a corner is among the looks."""
     n = minimum(count, float(LOOKS))
+    late = n - where(n < _FEW, 1.0, 2.0)
+    most = where(n < _FEW, _FADED_OF_FEW / (n - 3.0), _FADED)
     before = last = map_fields(_none, smooth)
     for order in range(2, LOOKS):
-        difference, late = take_stage(differences, order, smooth), n <= float(order + 2)
-        before = map_fields(_sum_of_sizes, before, difference, not late)
-        last = map_fields(_sum_of_sizes, last, difference, late & (n > float(order)))
-    return map_fields(_smooth_where_faded, smooth, before, last)
+        difference, mask = take_stage(differences, order, smooth), late <= float(order)
+        before = map_fields(_sum_of_sizes, before, difference, not mask)
+        last = map_fields(_sum_of_sizes, last, difference, mask & (n > float(order)))
+    return map_fields(_smooth_where_faded, smooth, before, last, most)
 
 
 smooth_of_differences = compile_callable(_smooth_of_differences)
@@ -331,7 +335,7 @@ def _track_by_all(looks, number, t, h, closing, lanes, count, smooth, seen, last
 
     count : how many looks the motion has had, this one included
     """
-    ended = lanes & (count <= looks.count) & (looks.count >= 3.0)
+    ended = lanes & (count <= looks.count) & (looks.count >= 4.0)
     if any_lane(ended):
         before = grid_time(number - 1, h, t)
         best, when, last = search(looks, number - 1, before, h, looks.count, True, ended, smooth, best, when, last)
@@ -340,10 +344,11 @@ def _track_by_all(looks, number, t, h, closing, lanes, count, smooth, seen, last
     put_stage(looks.peaks, place, select(lanes, seen[4], take_stage(looks.peaks, place, best)))
     put_stage(looks.lasts, place, select(lanes, lasts[1], take_stage(looks.lasts, place, last)))
     # around the end of a motion the parabola has to do, one look later, when five tell of a jump
-    corner, v1, v2, v3 = map_fields(_at_corner, smooth, looks.count < 3.0), seen[2], seen[3], seen[4]
+    beside = (looks.count < 3.0) | ((looks.count < 4.0) & (count <= looks.count))
+    corner, v1, v2, v3 = map_fields(_at_corner, smooth, beside), seen[2], seen[3], seen[4]
     best, when = track_by_three(number, t, h, False, lanes, corner, seen, best, when)
     if closing:
-        corner = map_fields(_at_corner, smooth, count < 3.0)
+        corner = map_fields(_at_corner, smooth, count < 4.0)
         best, when = track_by_three(number, t, h, True, lanes, corner, newest_twice(seen), best, when)
     last = last_above(number, t, h, lanes, lanes & (count < 2.0), lasts, last)
     crests = any_field(map_fields(_smooth_crest, v1, v2, v3, best, smooth))
@@ -351,7 +356,7 @@ def _track_by_all(looks, number, t, h, closing, lanes, count, smooth, seen, last
     wanted = lanes & ((count == float(LOOKS)) | ((crests | falls) & (count > float(LOOKS))))
     if any_lane(wanted):
         best, when, last = search(looks, number, t, h, count, False, wanted, smooth, best, when, last)
-    closed = lanes & (count >= 3.0)
+    closed = lanes & (count >= 4.0)
     if closing and any_lane(closed):
         best, when, last = search(looks, number, t, h, count, True, closed, smooth, best, when, last)
     return best, when, last
