@@ -367,7 +367,8 @@ def _echo_methods(campaign: "Campaign", cases: int | None, repeats: int) -> None
     with naming_faults(campaign.model_reference, "the model"):
         [[own, *others]] = in_threads(lambda campaign: compare_methods(campaign, cases, repeats), [campaign])
     typer.echo(f"{campaign.name}: methods at the error of the model's own, one thread")
-    whose = f"  (the model's own; {own.metric})" if own.metric else "  (the model's own)"
+    said = ["the model's own", own.metric, f"without {', '.join(own.left_out)}" if own.left_out else ""]
+    whose = f"  ({'; '.join(filter(None, said))})"
     for timing in (own, *others):
         mark = f", {own.case_s / timing.case_s:5.2f} times as fast" if timing is not own else whose
         method, case_us = timing.clock.method, timing.case_s * 1e6

@@ -8,8 +8,10 @@ tolerances.  Every other method that can fly the model is tried, on a fixed grid
 rough tolerances to fine ones, until its error is no larger than the model's own.  The error is the largest difference
 of a metric from a reference flight, in any case, as a fraction of that metric's largest magnitude; the metric that has
 it is named.  Metrics that are but the rounding of larger numbers, such as the altitude at the ground, are left out.
-The reference is flown by DOP853 to a tolerance of 1e-13.  An error no larger than the difference that a tolerance of
-1e-12 makes counts as none, such as in the time of a flat maximum, or of the largest of several that are alike.  Samples of the control stay where they are: a model with
+The reference is flown by DOP853 to a tolerance of 1e-13.  An error that may be the reference's own counts as none:
+one of a few times the difference that a tolerance of 2e-13 makes, such as in the time of a flat maximum.  Left out and
+named are metrics that the model's own method does not determine where it does others, such as the time of the largest
+of several maxima that are alike.  Samples of the control stay where they are: a model with
 `control` is tried with whole numbers of steps between them.
 """
 
@@ -37,7 +39,8 @@ _SHORT = 0.15  # s, about, of a flight one case at a time; a longer one is only 
 _TRIAL = 16  # cases
 _SLOWEST = 12  # times that a case takes longer alone, at most: to guess from a flight in lanes
 
-_TIGHT, _NEARLY_AS_TIGHT = 1e-13, 1e-12
+_TIGHT, _NEARLY_AS_TIGHT, _DOUBT = 1e-13, 2e-13, 4.0
+_UNDETERMINED = 0.1  # of a metric's size
 _TOLERANCES = tuple(10.0 ** (-k / 4) for k in range(16, 53))
 # steps are tried so many quarters of an octave longer than the model's own, and so many shorter
 _LONGER, _SHORTER = 28, 8
@@ -147,13 +150,14 @@ def _shortest(callers: list[Callable[[], tuple[float, float]]], repeats: int) ->
 class MethodTiming:
     """A method at the error of the model's own.
 
-    case_s : shortest time of a case [s];  metric : of the model's own, the one that has this error
+    case_s : shortest time of a case [s];  of the model's own: metric : that has this error;  left_out : metrics
     """
 
     clock: Clock
     error: float
     case_s: float
     metric: str = ""
+    left_out: tuple[str, ...] = ()
 
     @property
     def setting(self) -> str:
@@ -187,7 +191,7 @@ def compare_methods(campaign: Campaign, n_cases: int | None, repeats: int) -> li
     models = [replace(timed, model=replace(timed.model, clock=clock)) for clock, _ in known]
     times = _shortest([caller(cases, usual_width(timed.model)) for cases in models], repeats + 1)
     own, *others = [MethodTiming(*method, case_s) for method, (case_s, _) in zip(known, times, strict=True)]
-    return [replace(own, metric=metric), *sorted(others, key=lambda timing: timing.case_s)]
+    return [replace(own, metric=metric, left_out=trials.left_out), *sorted(others, key=lambda timing: timing.case_s)]
 
 
 def _first_within(trials: "_Trials", clocks: Iterator[Clock], most: float) -> tuple[Clock, float] | None:
@@ -238,7 +242,21 @@ class _Trials:
         self._scales = np.array([size if np.isfinite(size) and size > 0.0 else 1.0 for size in sizes])
         self._true = self._flown(self._adaptive("dop853", _TIGHT))
         self._least = self._sizes_of_rounding()
-        self._doubt = self._errors(self._flown(self._adaptive("dop853", _NEARLY_AS_TIGHT)))
+        nearly = self._errors(self._flown(self._adaptive("dop853", _NEARLY_AS_TIGHT)))
+        self._doubt = {name: _DOUBT * error for name, error in nearly.items()}
+        self.left_out = self._leave_out(self._errors(own))
+
+    def _leave_out(self, errors: dict[str, float]) -> tuple[str, ...]:
+        """Names of the metrics that are undetermined beside others; their errors count no more.
+
+        errors : of the model's own.
+        """
+        undetermined = {name: max(error, self._doubt[name]) >= _UNDETERMINED for name, error in errors.items()}
+        if all(undetermined.values()):
+            return ()
+        names = tuple(name for name, is_so in undetermined.items() if is_so)
+        self._doubt |= dict.fromkeys(names, np.inf)
+        return names
 
     def ladders(self) -> Iterator[Iterator[Clock]]:
         """Of every other method its clocks, from rough to fine."""
