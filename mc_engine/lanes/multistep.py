@@ -6,7 +6,7 @@ All slopes must belong to one smooth motion.  A flight begins by single steps of
 lane anew that has met an event, or whose discrete state a sample of the control has changed.
 
 The methods are stable for short steps only.  An oscillation of w rad/s grows unless step times w is below 0.37, 0.26,
-0.18, 0.12, 0.08 for orders 8 to 12 (measured in tests/mc_engine/lanes/test_multistep.py).
+0.18, 0.12, 0.075 for orders 8 to 12 (measured in tests/mc_engine/lanes/test_multistep.py).
 
 Outputs between grid points lie on the polynomial through the last looks at them, by their differences.
 

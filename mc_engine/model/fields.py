@@ -217,11 +217,12 @@ class FixedStep:
         `mc-engine check` reports.  In a model with a stopping event, see `Event`.
     control_every : int or str, steps from one call of `control` to the next
     method : str, "rk4" (order 4), or for long smooth arcs "abm8" to "abm12", Adams-Bashforth-Moulton of order 8 to 12,
-        or "gj6" to "gj10", Gauss-Jackson with differences of order 6 to 10, where every state is the rate of another or
-        has one.  ABM is stable for steps below 0.37, 0.26, 0.18, 0.12, 0.08 over the fastest angular frequency [rad/s],
-        GJ for 0.33, 0.24, 0.17, 0.12, 0.09, and with weak damping only, see `mc_engine.lanes.gauss_jackson`.  Both
-        start by DOP853, and again after each event and each sample of the control that changes the discrete state.
-        `mc-engine check` flies the nominal case with half of the step, too, and reports steps that are far too long.
+        or "gj6" to "gj10", Gauss-Jackson with differences of order 6 to 10, where every state is the rate of another
+        or has one.  ABM is stable for steps below 0.37, 0.26, 0.18, 0.12, 0.075 over the fastest angular frequency
+        [rad/s], GJ for 0.33, 0.24, 0.17, 0.12, 0.09, and with weak damping only, see `mc_engine.lanes.gauss_jackson`.
+        Both start by DOP853, and again after each event and each sample of the control that changes the discrete
+        state. `mc-engine check` flies the nominal case with half of the step, too, and reports steps that are far too
+        long.
     rates : tuple of pairs (state, its rate) by their names without units, for GJ: the derivative of the first state of
         a pair is the second
 

@@ -10,6 +10,7 @@ from flown_models import OSCILLATOR, RAIL, flown
 from plain_steps import MIXED, ahead, by, dop853, fields, twin, weighted
 
 from mc_engine.lanes.multistep import adams_weights, multistep_tables
+from mc_engine.model import FixedStep
 
 ORDERS = (8, 9, 10, 11, 12)
 
@@ -60,6 +61,11 @@ def test_an_oscillation_keeps_its_energy_below_the_stability_limit_and_grows_abo
     assert change[0] == pytest.approx(DRIFT[order], rel=0.02, abs=5e-15)
     assert change[1] < 0.05
     assert not change[2] < 0.05
+
+
+def test_the_limits_that_are_documented_are_those_of_stable_steps():
+    limits = ", ".join(f"{stable:g}" for stable, _ in STABLE.values())
+    assert f"ABM is stable for steps below {limits} over the fastest" in " ".join(FixedStep.__doc__.split())
 
 
 class AdamsSteps:
