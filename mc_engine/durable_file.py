@@ -230,9 +230,9 @@ def publish_all(root: Path, names: Sequence[tuple[str, str]]) -> None:
         for temporary, name in names:
             before, last, held = temporary.rpartition("/")[2], name.rpartition("/")[2], folder.descriptor
             try:
-                with _refusing_folder(folder.path / last):
+                with disk_errors(root / name), _refusing_folder(folder.path / last):
                     os.replace(folder.of(before), folder.of(last), src_dir_fd=held, dst_dir_fd=held)
-            except (OSError, StoreError):
+            except StoreError:
                 _discard(root, temporary)
                 raise
         _sync_names(folder)

@@ -34,14 +34,18 @@ def damaged_contents(whole, rng, cuts, flips):
 
 
 def check_all_damage_is_named(run, cuts, flips, seed):
-    """Damage one file at a time; how often, and how often `verify` did not name it."""
+    """Damage one file at a time, and let `verify` name it; how often.
+
+    A journal cut between two lines is one of an earlier time: then the files are named that it does not have.
+    """
     rng, tried, unseen = np.random.default_rng(seed), 0, []
     for name, path in files_of(run).items():
         whole = path.read_bytes()
         for content in damaged_contents(whole, rng, cuts, flips):
             path.write_bytes(content)
             tried += 1
-            if not any(problem.startswith(name) for problem in damage(run)):
+            earlier = name == "journal.jsonl" and content.endswith(b"\n") and whole.startswith(content)
+            if not any(problem.startswith(name) or earlier for problem in damage(run)):
                 unseen.append((name, len(content)))
         path.write_bytes(whole)
     assert damage(run) == []
