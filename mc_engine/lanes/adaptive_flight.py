@@ -65,6 +65,7 @@ _FEW = 3.0  # looks at an event with its width; then the width grows
 _CHORDS = 8.0  # then every other look halves the bracket, so that none stalls
 _CLOSED = 2e-15  # of time and length: the width at which the bracket of an event is closed
 _CREST = 1e-7  # of a step: the same for a peak, which is flat and differs by the square of this
+_AT_SAMPLE = 1e-12  # of the time: an event at a sample may be found so far behind it
 _NEVER, _NONE, _NAN = 1e300, 1e-300, float("nan")
 
 
@@ -210,9 +211,8 @@ changed = compile_inline(_changed)
 
 @physics
 def _next_sample(t, sample, period):
-    """Number of the first sample that is not before t, and not before that one."""
-    number = floor(t / period)
-    return maximum(sample, where(number * period < t, number + 1.0, number))
+    """Number of the first sample that is not before an event at t, and not before that one."""
+    return maximum(sample, -floor(-(1.0 - _AT_SAMPLE) * t / period))
 
 
 def _fly(

@@ -101,6 +101,15 @@ def test_a_phase_without_control_is_flown_in_long_steps_between_the_same_samples
     same_bytes(ours, flown(coasting, width=1, wake_s=wakes))
 
 
+def test_a_phase_with_control_that_begins_at_a_sample_has_that_sample():
+    coasting = load_model("long_coast.py", FOLDER)
+    gridded = replace(coasting, clock=FixedStep(step=0.1, until=10_000.0))
+    wakes = np.array([5.2, 12.3, 60.0, 1000.3, 2000.0, 3599.9, 3600.0, 7200.0])
+    ours, theirs = (flown(model, wake_s=wakes) for model in (coasting, gridded))
+    np.testing.assert_array_equal(ours["samples"], 102.0)
+    np.testing.assert_array_equal(ours["noise"], theirs["noise"])
+
+
 @pytest.mark.parametrize(
     ("model", "width", "chunk", "threads"),
     [
