@@ -56,6 +56,7 @@ def debug(
     from bdb import BdbQuit
 
     from mc_engine.campaign.loading import load_campaign
+    from mc_engine.model.faults import naming_faults
     from mc_engine.model.simulator import Simulator
 
     if sum([at_time is not None, at_event is not None, at_nan]) > 1:
@@ -76,11 +77,13 @@ def debug(
         typer.echo(
             f"the campaign has the cases 0 to {campaign.cases - 1}; {case} is one that `extend` would add", err=True
         )
-    try:
-        ended = fly_debugged(campaign.model, inputs, noise, campaign.seed, stop, typer.echo)
-    except BdbQuit:  # the user left the debugger
-        return
-    _echo_end("the nominal case" if case is None else f"case {case}", ended, stop)
+    who = "the nominal case" if case is None else f"case {case}"
+    with naming_faults(campaign.model_reference, who):
+        try:
+            ended = fly_debugged(campaign.model, inputs, noise, campaign.seed, stop, typer.echo)
+        except BdbQuit:  # the user left the debugger
+            return
+    _echo_end(who, ended, stop)
 
 
 def _refuse_unknown_event(model: Any, name: str) -> None:

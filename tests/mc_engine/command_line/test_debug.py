@@ -59,6 +59,15 @@ def test_it_stops_at_the_line_that_loses_a_number(tmp_path):
     assert "the nominal case: not-finite at t = " in printed
 
 
+def test_an_error_of_the_physics_is_named_with_its_line(tmp_path):
+    wrong = "    low = math.sqrt(s.x - 7.0e6)"
+    edits = ("from mc_engine.lanes", "import math\n\nfrom mc_engine.lanes"), (BELOW, f"{wrong}\n{BELOW}")
+    folder = write_campaign(tmp_path / "wrong", *edits)
+    status, _, complaint = debug(folder, "--at-nan")
+    assert status == 2
+    assert f"model.py, line {line_of(folder, wrong)}: ValueError: math domain error" in complaint
+
+
 def test_print_and_breakpoint_of_the_physics_run_there_and_are_refused_elsewhere(tmp_path):
     (tmp_path / "hooked.py").write_text(
         "import sys\n\ndef stop():\n    here = sys._getframe(1)\n"
