@@ -251,7 +251,7 @@ class _Trials:
 
         errors : of the model's own.
         """
-        undetermined = {name: max(error, self._doubt[name]) >= _UNDETERMINED for name, error in errors.items()}
+        undetermined = {name: max(error, self._doubt.get(name, 0.0)) >= _UNDETERMINED for name, error in errors.items()}
         if all(undetermined.values()):
             return ()
         names = tuple(name for name, is_so in undetermined.items() if is_so)
@@ -315,7 +315,7 @@ class _Trials:
         if list(flown["status"]) != list(self._true["status"]):
             return np.inf, ""
         errors = self._errors(flown)
-        counted = {name: error for name, error in errors.items() if error > self._doubt[name]}
+        counted = {name: error for name, error in errors.items() if error > self._doubt.get(name, 0.0)}
         worst = max(counted, key=lambda name: counted[name], default="")
         return counted.get(worst, 0.0), worst
 

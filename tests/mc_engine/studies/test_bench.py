@@ -117,7 +117,7 @@ def test_the_metric_with_the_largest_error_is_named_and_one_that_is_rounding_is_
     trials._true = {"status": ["ok"] * 2, "speed_m_s": np.array([50.0, 40.0]), "ground_km": np.array([4e-11, -3e-10]),
                     "height_m": np.array([2e-6, 1e-6]), "crossing_s": nothing}  # fmt: skip
     trials._least = trials._sizes_of_rounding()
-    trials._doubt = dict.fromkeys(units, 0.0)
+    trials._doubt = trials._errors(trials._true)
     flown = {**trials._true, "speed_m_s": np.array([50.0, 40.1]), "ground_km": np.array([2e-11, 0.0])}
     trials._flown = lambda clock: flown
     assert trials.largest_error(None) == (pytest.approx(0.002), "speed_m_s")
@@ -126,6 +126,8 @@ def test_the_metric_with_the_largest_error_is_named_and_one_that_is_rounding_is_
     assert trials.error(None) == pytest.approx(0.5)
     flown["crossing_s"] = np.array([np.nan, 1.0])
     assert trials.largest_error(None) == (np.inf, "crossing_s")
+    flown |= {"crossing_s": nothing, "ground_km": nothing}
+    assert trials.largest_error(None) == (np.inf, "ground_km")
 
 
 # all perigees of an orbit are alike: rounding chooses the lowest
