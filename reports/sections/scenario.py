@@ -9,7 +9,7 @@ from reports.run.chosen_units import spread_text
 from reports.run.flown import Flown
 from reports.run.phases import phase_times
 from reports.sections.tables import fixed_table, input_table
-from reports.text.numbers import counted, exact, number, with_unit
+from reports.text.numbers import counted, number, with_unit
 from reports.text.source_places import of_source
 
 EVENTS = ("time of ", "start of ", "end of ")  # how the meaning of an event's time begins
@@ -62,7 +62,7 @@ def correlation_table(flown: Flown) -> Table | None:
     rows = [
         (
             Cell(f"{pair['first']}, {pair['second']}"),
-            Cell(exact(pair["rank"]), pair["rank"]),
+            Cell(number(pair["rank"]), pair["rank"]),
             Cell(of_source(pair["source"] or "not stated")),
         )
         for pair in flown.manifest.get("correlations", [])

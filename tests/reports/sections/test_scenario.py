@@ -72,11 +72,13 @@ def test_assumptions_are_what_the_campaign_file_sets_and_the_rest_is_in_the_appe
 
 def test_inputs_that_the_campaign_correlates_are_named_with_rank_and_source():
     run = synthetic_run(50, failed=0)
-    run.manifest["correlations"] = manifest_of(load_campaign("geo_injection/parking_orbit_errors"))["correlations"]
+    pairs = manifest_of(load_campaign("geo_injection/parking_orbit_errors"))["correlations"]
+    run.manifest["correlations"] = [*pairs, {**pairs[0], "rank": 0.9689549735054895}]  # as a covariance has it
     (table,) = [one for one in section(run, "scenario").blocks if getattr(one, "caption", "") == "Correlated inputs"]
     pair, rank, source = (cell.text for cell in table.rows[0])
     assert (pair, rank) == ("initial_position_t_m, initial_velocity_r_m_s", "−0.8915")
     assert source == "not stated"
+    assert table.rows[-1][1].text == "0.96895"
 
 
 def test_without_figures_of_its_own_a_model_gets_histories_and_scatters_of_what_matters():
