@@ -34,7 +34,7 @@ except ImportError:  # Windows: processes that start together may compile the sa
 
 Form = tuple[str, ...]  # "float64", "int64" or "uint64" for each argument, with "[]" or "[,]" for an array
 _NUMBERS: dict[str, Any] = {"float64": ctypes.c_double, "int64": ctypes.c_int64, "uint64": ctypes.c_uint64}
-_OF_PYTHON = {float: "float64", int: "int64"}
+_WORDS: dict[Any, str] = {float: "float64", int: "int64"} | {np.dtype(name): name for name in _NUMBERS}
 _ARRAYS = {1: "[]", 2: "[,]"}
 _DIGEST_BYTES = 32
 _IDLE_NAMES = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")  # of numba's settings; they change no code of a kernel
@@ -137,9 +137,10 @@ def form_of(arguments: Sequence[Any]) -> Form:
 
 
 def _word(argument: Any) -> str:
-    kind = argument.dtype.name if isinstance(argument, np.ndarray | np.generic) else _OF_PYTHON.get(type(argument), "")
-    if kind not in _NUMBERS:
-        what = kind or type(argument).__name__
+    given = argument.dtype if isinstance(argument, np.ndarray | np.generic) else type(argument)
+    kind = _WORDS.get(given)
+    if kind is None:
+        what = given.__name__ if isinstance(given, type) else given
         raise TypeError(f"a kernel takes {', '.join(_NUMBERS)} and arrays of them, not {what}")
     if not isinstance(argument, np.ndarray):
         return kind

@@ -1,5 +1,6 @@
 """Tables of saved time histories: case_id, t_s, the model's outputs with units, and the phase; which rows they hold."""
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -38,105 +39,119 @@ def rows_to_keep(record: np.ndarray, rows: int, lines: slice = slice(None), n_ro
     the second derivative, here of the quantity that bends most in units of its range.
     """
     first, stop, _ = lines.indices(len(record))
-    times = record[first, :n_rows]
-    repeats, count = np.arange(1, times.size), np.full(1, times.size - 1)
-    _repeats(record, first, stop, repeats, count)
-    left = np.delete(np.arange(times.size), repeats[: count[0]])
+    n = record.shape[1] if n_rows is None else n_rows
+    left, always, count = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.zeros(1, dtype=np.int64)
+    _without_repeats(record, first, stop, n, left, always, count)
+    left = left[: count[0]]
     if left.size <= rows:
         return left
-    t, ranges = times[left], _ranges(record[first + 1 : stop, :n_rows])
-    errors, jumps = np.zeros(t.size), np.zeros(t.size - 1)
-    _errors_and_jumps(record, first + 1, *ranges, left, t, np.empty(t.size), np.empty(t.size), errors, jumps)
-    always = _at_events(times)[left] | _at_edges(jumps, rows)
-    always[0] = always[-1] = True
-    bend = np.sqrt(errors)
-    density = (1.0 - _EVEN) * bend / max(bend.cumsum()[-1], _TINY)
-    density[1:] += _EVEN * ((t[1:] - t[:-1]) / max(t[-1] - t[0], _TINY))
-    density[always] = np.inf
-    shares = _shares(density, max(rows, int(always.sum()) + rows // 2))
-    places = np.floor(shares.cumsum() + 0.5)
-    always[1:] |= places[1:] > places[:-1]  # the first is kept in any case
-    return left[always]
+    always, t = always[: left.size], record[first, left]
+    errors, jumps, share, values = np.zeros((4, left.size))
+    _errors_and_jumps(record, first + 1, stop, left, t, share, values, errors, jumps)
+    always[_at_edges(jumps, rows)] = 1
+    _densest(t, np.sqrt(errors), always, rows, left, share, count)
+    return left[: count[0]]
 
 
 @compiled_loop
-def _repeats(record, first, stop, rows, count):
-    """Of some rows, those that are as the one before in all lines; not a number equals its like.
+def _without_repeats(record, first, stop, n_rows, left, always, count):
+    """The rows that are not as the one before in all lines; not a number equals its like.
 
-    rows : int64[n], after the call those in front.  count : int64[1], how many there are.
+    left : int64[n_rows], those rows in front after the call.  count : int64[1], how many they are.
+    always : int64[n_rows], for each of them 1 if it is of an event, one of more than two rows of one time; 0 else.
     """
-    n = count[0]
-    for line in range(first, stop):
-        found = 0
-        for k in range(n):
-            before, after = record[line, rows[k] - 1], record[line, rows[k]]
-            rows[found] = rows[k]
-            found += after == before or (after != after and before != before)
-        n = found
+    n = 0
+    for k in range(n_rows):
+        line = first
+        while k > 0 and line < stop:
+            before, after = record[line, k - 1], record[line, k]
+            if not (after == before or (after != after and before != before)):
+                break
+            line += 1
+        if line == stop:
+            continue
+        t = record[first, k]
+        is_last = k > 1 and record[first, k - 2] == t
+        is_between = 0 < k < n_rows - 1 and record[first, k - 1] == t and record[first, k + 1] == t
+        is_first = k < n_rows - 2 and record[first, k + 2] == t
+        left[n], always[n] = k, is_last or is_between or is_first
+        n += 1
     count[0] = n
 
 
-def _ranges(quantities: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Half of the least and half of the largest number of each quantity, of those that are finite; halved, so that no
-    difference is above the largest number.  Without any, inf and -inf."""
-    low, high = quantities.min(axis=1), quantities.max(axis=1)
-    for line in np.flatnonzero(~(np.isfinite(low) & np.isfinite(high))):
-        numbers = quantities[line, np.isfinite(quantities[line])]
-        low[line], high[line] = numbers.min(initial=np.inf), numbers.max(initial=-np.inf)
-    return 0.5 * low, 0.5 * high
-
-
 @compiled_loop
-def _errors_and_jumps(record, first, low, high, left, t, share, values, errors, jumps):
-    """Of the rows that are left: how far the straight line between the neighbours errs, and how far, without the first,
-    it jumps from the one before at the same time; in the quantity where most, in units of its range.
+def _errors_and_jumps(record, first, stop, left, t, share, values, errors, jumps):
+    """Of the rows that are left: how far the straight line between the neighbours errs, and how far each jumps from the
+    one before at the same time; in the quantity where most, in units of its range.
 
-    Numbers that are not finite count as 0, as those of a quantity without a range.
-    first : line of the first quantity.  low, high : see `_ranges`.  t : float64[n_left], times of the rows.
-    share, values : float64[n_left], to work in.  errors : float64[n_left], jumps : float64[n_left - 1], 0 at first.
+    Numbers that are not finite count as 0, as those of a quantity without a range.  All are halved, so that no
+    difference is above the largest number.
+    first, stop : lines of the quantities.  t : float64[n_left], times of the rows.
+    share, values : float64[n_left], to work in.  errors, jumps : float64[n_left], 0 at first.
     """
     n = left.size
     for k in range(1, n - 1):
         width = t[k + 1] - t[k - 1]
         share[k] = (t[k] - t[k - 1]) / (width if width > 0.0 else 1.0)
-    for line in range(low.size):
-        least, size = low[line], high[line] - low[line]
+    for line in range(first, stop):
+        low, high = np.inf, -np.inf
+        for k in range(n):
+            value = 0.5 * record[line, left[k]]
+            low = value if -np.inf < value < low else low
+            high = value if high < value < np.inf else high
+        size = high - low
         if not size > 0.0:
             continue
         for k in range(n):
-            value = 0.5 * record[first + line, left[k]]
-            values[k] = (value - least) / size if -np.inf < value < np.inf else 0.0
+            value = 0.5 * record[line, left[k]]
+            values[k] = (value - low) / size if -np.inf < value < np.inf else 0.0
         for k in range(1, n - 1):
             error = abs((values[k + 1] - values[k - 1]) * share[k] + values[k - 1] - values[k])
             errors[k] = error if error > errors[k] else errors[k]
-        for k in range(n - 1):
-            jump = abs(values[k + 1] - values[k]) if t[k + 1] == t[k] else 0.0
+        for k in range(1, n):
+            jump = abs(values[k] - values[k - 1]) if t[k] == t[k - 1] else 0.0
             jumps[k] = jump if jump > jumps[k] else jumps[k]
 
 
-def _at_events(t: np.ndarray) -> np.ndarray:
-    """Mask of the rows that are of an event: more than two of one time.  t : float64[n], of all rows."""
-    instant = np.append(0, (t[1:] != t[:-1]).cumsum())
-    is_event: np.ndarray = (np.bincount(instant) > 2)[instant]
-    return is_event
-
-
 def _at_edges(jumps: np.ndarray, rows: int) -> np.ndarray:
-    """Mask of the rows before and after the largest jumps.  jumps : float64[n - 1], from row to row."""
+    """Indices of the rows before and after the largest jumps.  jumps : float64[n], to each row from the one before."""
     edges = np.flatnonzero(jumps > _EDGE)
     edges = edges[np.argsort(-jumps[edges], kind="stable")[: _MOST_EDGES * rows]]
-    mask = np.zeros(jumps.size + 1, dtype=bool)
-    mask[edges] = mask[edges + 1] = True
-    return mask
+    return np.append(edges - 1, edges)
 
 
-def _shares(density: np.ndarray, total: int) -> np.ndarray:
-    """min(1, c density), with the c that makes the sum `total`; 1 for each above 0 where they are no more than that."""
-    falling = np.sort(density)[::-1]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        c = (total - np.arange(falling.size)) / falling[::-1].cumsum()[::-1]  # where as many of the largest are 1
-        right = np.flatnonzero(c * falling <= 1.0)
-    return np.minimum(1.0, c[right[0]] * density) if right.size else (density > 0.0).astype(np.float64)
+@compiled_loop
+def _densest(t, bends, always, rows, left, density, count):
+    """The rows that are kept, in front of `left` after the call; count[0] : how many they are.
+
+    t, bends, always : of the rows in `left`.  density : float64[n_left], to work in.
+    A row has the share min(1, c density), with the c that makes the sum of all what is wanted, and 1 where it is kept
+    always.  Rows of a density above 0 have 1 if they are no more than that.  It is kept where the sum of the shares up
+    to it passes a next half.
+    """
+    n = left.size
+    always[0] = always[n - 1] = 1
+    n_always = always.sum()
+    wanted = max(rows, n_always + rows // 2)
+    bend, even = (1.0 - _EVEN) / max(bends.sum(), _TINY), _EVEN / max(t[n - 1] - t[0], _TINY)
+    for k in range(1, n):
+        density[k] = bend * bends[k] + even * (t[k] - t[k - 1])
+    c, n_full, n_before = 0.0, 0, -1
+    while n_full > n_before:  # the larger c, the more shares are 1
+        n_before, n_full, rest = n_full, 0, 0.0
+        for k in range(n):
+            is_full = always[k] == 1 or c * density[k] >= 1.0
+            n_full += is_full
+            rest += 0.0 if is_full else density[k]
+        c = (wanted - n_full) / rest if rest > 0.0 else c
+    total, n_kept = 0.5, 0
+    for k in range(n):
+        before = math.floor(total)
+        total += 1.0 if always[k] == 1 else min(1.0, c * density[k])
+        if always[k] == 1 or math.floor(total) > before:
+            left[n_kept] = left[k]
+            n_kept += 1
+    count[0] = n_kept
 
 
 PHASE_COLUMN = "phase"  # of histories of a model with phases: its name, in words

@@ -98,7 +98,7 @@ def test_a_kernel_finds_the_compilers_own_functions_in_a_process_that_compiles_n
 
 @pytest.mark.parametrize(("given", "told"), [
     (np.zeros(16)[::2], "one with gaps"), (np.zeros(8, dtype=np.float32), "float32"), (np.float32(1.0), "float32"),
-    (np.zeros((2, 2, 2)), "one of 3 dimensions"), (True, "bool"), ([0.0], "list"),
+    (np.zeros(8, dtype=">f8"), ">f8"), (np.zeros((2, 2, 2)), "one of 3 dimensions"), (True, "bool"), ([0.0], "list"),
 ])  # fmt: skip
 def test_a_kernel_refuses_what_it_cannot_take(given, told, tmp_path):
     with pytest.raises(TypeError, match=f"a kernel takes .*, not {told}"):

@@ -69,6 +69,6 @@ def test_rows_are_chosen_among_those_of_a_flight_beside_others_by_machine_code_a
     assert T[10_000] in t[kept]  # the event
     assert (np.diff(t[kept]) == 0.0).sum() > 5  # edges
     assert kept == rows_to_keep(np.array(flight), 60).tolist()
-    for name in ("_repeats", "_errors_and_jumps"):
+    for name in ("_without_repeats", "_errors_and_jumps", "_densest"):
         monkeypatch.setattr(histories, name, getattr(histories, name).__wrapped__)
     assert kept == rows_to_keep(record, 60, slice(2, -3), t.size).tolist()
