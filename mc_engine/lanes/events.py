@@ -9,9 +9,10 @@ not seen, so the step must be shorter than the time between two events of one ki
 M. Dowell, P. Jarratt, "A modified regula falsi method", BIT 11 (1971) 168-174.
 """
 
-from mc_engine.lanes.compiler import compile_inline
+from mc_engine.lanes import extrema
+from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.functions import any_lane, maximum, minimum, where
-from mc_engine.lanes.history import record_change, record_row
+from mc_engine.lanes.history import look_shared, record_change, record_row
 from mc_engine.lanes.physics_function import physics
 from mc_engine.lanes.tuples import any_field, least, map_fields, select, spread
 
@@ -92,12 +93,26 @@ def _locate(f, method, signs, t, finish, s, m, p, o, length, end, g_start, g_end
 locate = compile_inline(_locate)
 
 
-def _follow(f, method, t, finish, h, s, end, m, p, o, g_start, g_end, flying, history, rows):
+def _look_once(f, lanes, t, s, m, p, o, reached):
+    """(best, when, last) with the outputs at an instant that is no grid point, as they are, in some lanes."""
+    best, when, last = reached
+    seen = look_shared(f, t, s, m, p, o)
+    value = f.peaks_of(seen)
+    when = map_fields(extrema.end_time, when, best, value, t, lanes, t)
+    best = map_fields(extrema.end_value, best, value, lanes)
+    return best, when, map_fields(extrema.above, last, f.lasts_of(seen), t, lanes)
+
+
+look_once = compile_callable(_look_once)
+
+
+def _follow(f, method, t, finish, h, s, end, m, p, o, g_start, g_end, flying, reached, history, rows):
     """What becomes of a step [t, finish] of length h in which some flying lane meets events.
 
     s, end : states at both ends of the step as if there were no events; g_start, g_end : event values there.
-    Returns (state, memory, time, stopped, overrun, lost): lanes that stop end at their event, the others at `finish`;
-    those are lost of which the values there do not tell whether they have met another.
+    reached : running extrema (best, when, last), which look at both sides of each event that does not stop the lane.
+    Returns (state, memory, time, stopped, overrun, lost, reached): lanes that stop end at their event, the others at
+    `finish`; those are lost of which the values there do not tell whether they have met another.
     Event functions of time see `finish` itself at the end, not the sum t + h: the next step starts from the same
     number, so an event on the grid is met once, neither missed nor met twice by a rounding.
     """
@@ -116,11 +131,13 @@ def _follow(f, method, t, finish, h, s, end, m, p, o, g_start, g_end, flying, hi
         time, end = where(stops, now, time), select(stops, state, end)
         on, hit = pending & (not stops), map_fields(_one_where, fired, t)
         m = select(pending, spread(f.note(now, state, m, p, o, hit), t), m)
+        reached = look_once(f, on, now, state, m, p, o, reached)
         if history.shape[0] > 0:
             record_row(f, history, rows, on, now, state, m, p, o)
         switched, memory = f.switch(now, state, m, p, o, hit)
         s, m = select(on, spread(switched, t), s), select(on, spread(memory, t), m)
         t, rest = where(on, now, t), where(on, rest - length, rest)
+        reached = look_once(f, on, t, s, m, p, o, reached)
         if history.shape[0] > 0:
             record_change(f, history, rows, on, on, t, s, m, p, o)
         g_start = select(on, spread(f.events(t, s, m, p, o), t), g_start)
@@ -128,7 +145,7 @@ def _follow(f, method, t, finish, h, s, end, m, p, o, g_start, g_end, flying, hi
         g_end = select(on, spread(f.events(finish, end, m, p, o), t), g_end)
         pending = on & any_field(map_fields(crossed, g_start, g_end, signs))
     lost = flying & (not stopped) & any_field(map_fields(is_lost, g_start, g_end, signs))
-    return end, m, time, stopped, pending, lost
+    return end, m, time, stopped, pending, lost, reached
 
 
 follow = compile_inline(_follow)

@@ -6,7 +6,7 @@ An output that is NaN once has no extreme value; it has a last time above a leve
 from mc_engine.lanes.functions import maximum, minimum, where
 from mc_engine.lanes.physics_function import physics
 
-# what flights with adaptive steps track as one; a corner is a peak that is taken at the steps
+# what flights with adaptive steps track as one; a corner is a peak that is taken at steps and events
 EVENT, PEAK, CORNER, LAST = 0.0, 1.0, 2.0, 3.0
 _ALIKE = 4.0  # times as strongly; a Gauss curve with a deviation of two steps bends up to 2.6 times as strongly
 
@@ -134,13 +134,13 @@ def later_fall(when, x, t, h, mask):
 
 @physics
 def end_value(best, value, mask):
-    """Best value, an end point of the flight included where the mask holds."""
+    """Best value, that of an event or of the end of the flight included where the mask holds."""
     return where(mask & ((value > best) | (value != value)), value, best)
 
 
 @physics
 def end_time(when, best, value, t, mask, unused):
-    """Time of the best value, an end point of the flight included where the mask holds."""
+    """Time of the best value, that of an event or of the end of the flight included where the mask holds."""
     return where(mask & (value > best), t, where(mask & (value != value), value, when))
 
 
@@ -158,6 +158,7 @@ def falls(v0, v1, mask):
 
 @physics
 def fall_time(when, v0, v1, t0, t1, mask):
-    """Last time above zero, by linear interpolation where the value came down between two neighbours."""
+    """Last time above zero, by linear interpolation where the value came down between two neighbours, if that is later:
+    at an event between them it may have been above."""
     falling = falls(v0, v1, mask)
-    return where(falling, t0 + (t1 - t0) * (v0 / where(falling, v0 - v1, 1.0)), when)
+    return where(falling, maximum(when, t0 + (t1 - t0) * (v0 / where(falling, v0 - v1, 1.0))), when)

@@ -165,8 +165,8 @@ def _looks_from(v, w, t):
 looks_from = compile_inline(_looks_from)
 
 
-def _step(f, method, past, has_events, t, finish, h, s, m, p, o, flying, history, rows):
-    """One grid step from t to `finish`: (state, memory, time, stopped, overrun, broken, past) of every lane.
+def _step(f, method, past, has_events, t, finish, h, s, m, p, o, flying, reached, history, rows):
+    """One grid step from t to `finish`: (state, memory, time, stopped, overrun, broken, past, reached) of every lane.
 
     The event values at the start are taken anew, not handed on: they share what the first derivative computes.
     """
@@ -177,13 +177,13 @@ def _step(f, method, past, has_events, t, finish, h, s, m, p, o, flying, history
         g, g_end = spread(f.events(t, s, m, p, o), t), spread(f.events(now, end, m, p, o), t)
         met = flying & any_field(map_fields(may_have_crossed, g, g_end, f.signs_of(g)))
         if any_lane(met):
-            end, m, now, stopped, overrun, lost = follow(
-                f, method, t, finish, h, s, end, m, p, o, g, g_end, flying, history, rows
+            end, m, now, stopped, overrun, lost, reached = follow(
+                f, method, t, finish, h, s, end, m, p, o, g, g_end, flying, reached, history, rows
             )
             past = method.restart(past, met)
     size = total_in_pairs(end)
     broken = lost | (flying & (not (size - size == 0.0)))
-    return end, m, now, stopped, overrun & (not broken), broken, past
+    return end, m, now, stopped, overrun & (not broken), broken, past, reached
 
 
 step = compile_inline(_step)
@@ -193,7 +193,7 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
     """Fly one block from its first state to the stop or the time limit.
 
     The outputs are looked at where a step begins, beside its first derivative, with which they share most of
-    their work, and where a flight ends.
+    their work, at both sides of an event, and where a flight ends.
     A history has the start, every `stride` steps and their samples, all events, and the end.
     Returns (time, state, memory, status, unstopped, best, when, last) of every lane.
     """
@@ -224,8 +224,8 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
             record_row(f, history, rows, flying, begin, s, m, p, o)
         # the grid's own time, not a sum of steps: no rounding piles up, and a sample falls where it belongs
         finish = grid_time(k + 1, h, case)
-        end, memory, now, stopped, overrun, broken, past = step(
-            f, method, past, has_events, begin, finish, h, s, m, p, o, flying, history, rows
+        end, memory, now, stopped, overrun, broken, past, (best, when, last) = step(
+            f, method, past, has_events, begin, finish, h, s, m, p, o, flying, (best, when, last), history, rows
         )
         moved = flying & (not broken)
         if any_lane(not moved):  # a branch, which the processor predicts: the next step need not wait for the check

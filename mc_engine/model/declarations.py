@@ -53,7 +53,7 @@ def maximum_of(output: str, description: str = "", *, smooth: bool = True, **opt
 
     output : str, the name of an output
     description : str, one line; by default in the words of the output
-    smooth : bool, the extremum may lie between steps, on a curve through them; else it is taken at the steps
+    smooth : bool, the extremum may lie between steps, on a curve through them; else it is taken at steps and events
     options : low, high, sometimes, unit; see `Field`
 
     Returns the Metric, for `metrics`.

@@ -161,7 +161,7 @@ class Extremum:
     kind : str, "max", "min", or "last_above": the last time at which the output was above `level`, of which only the
         time is of use
     level : float, in SI; for "last_above"
-    smooth : bool, the extremum may lie between steps, on a curve through them; else it is taken at the steps
+    smooth : bool, the extremum may lie between steps, on a curve through them; else it is taken at steps and events
 
     >>> Extremum("peak", "altitude_km").kind
     'max'
