@@ -8,7 +8,7 @@ from mc_engine.lanes.physics_function import physics
 
 # what flights with adaptive steps track as one; a corner is a peak that is taken at steps and events
 EVENT, PEAK, CORNER, LAST = 0.0, 1.0, 2.0, 3.0
-_ALIKE = 4.0  # times as strongly; a Gauss curve with a deviation of two steps bends up to 2.6 times as strongly
+ALIKE = 4.0  # times as strongly; a Gauss curve with a deviation of two steps bends up to 2.6 times as strongly
 
 
 @physics
@@ -33,7 +33,7 @@ def smooth_where_bent_alike(smooth, v0, v1, v2, v3, v4, t0, t1, t2, t3, t4):
     before = ((v2 - v1) / b - (v1 - v0) / a) / (a + b)
     bend = ((v3 - v2) / c - (v2 - v1) / b) / (b + c)
     after = ((v4 - v3) / d - (v3 - v2) / c) / (c + d)
-    alike = ((a <= 0.0) | (bend >= _ALIKE * before)) & ((d <= 1e-3 * c) | (bend >= _ALIKE * after))
+    alike = ((a <= 0.0) | (bend >= ALIKE * before)) & ((d <= 1e-3 * c) | (bend >= ALIKE * after))
     return where(alike, smooth, 0.0)
 
 

@@ -26,16 +26,17 @@ from mc_engine.lanes import extrema
 from mc_engine.lanes.adaptive_step import attempt
 from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.fixed_step import LOOKS, grid_time, last_above, newest_twice, track_by_three
-from mc_engine.lanes.functions import any_lane, minimum, replace, where
+from mc_engine.lanes.functions import any_lane, maximum, minimum, replace, where
 from mc_engine.lanes.physics_function import physics
 from mc_engine.lanes.runge_kutta_pairs import DOP853, LARGEST_STAGES
 from mc_engine.lanes.stage_memory import put_stage, stage_memory, stage_sum, take_stage
 from mc_engine.lanes.tuples import add_scaled, any_field, map_fields, select, spread
 
 _ITERATIONS = 3  # of Newton's method between two looks, from a parabola or a chord
-# The most that the last two differences of an output may be, over those before: 0.24 at 7.5 steps a turn, more beside a
-# jump or a corner.  Of few looks the last one only, over so much for each before; of four, none tells of a short pulse.
-_FEW, _FADED, _FADED_OF_FEW = 6.0, 0.25, 0.9
+# The most that each of the last three differences of an output may be, over the sum of those before: 0.15 at 7.5 steps
+# a turn, more beside a jump or a corner.  Of fewer looks than nine it is the last two; of few the last one, over so
+# much for each before; of four, none tells of a short pulse.
+_FEW, _FADED, _FADED_OF_FEW = 6.0, 0.15, 0.9
 
 # differences : of neighbouring slopes at the last grid points, in a ring;  newest : index of the last in it
 # slope : at the last grid point;  known : how many slopes belong to the present motion, of each lane
@@ -243,21 +244,29 @@ def _sum_of_sizes(total, difference, mask):
 
 
 @physics
-def _smooth_where_faded(smooth, before, last, most):
-    return where(last <= most * before, smooth, 0.0)
+def _largest_size(largest, difference, mask):
+    return where(mask, maximum(largest, abs(difference)), largest)
+
+
+@physics
+def _smooth_where_faded(smooth, before, last, most, bend, change):
+    """`smooth` where the last differences are small, and the newest looks bend as those one look earlier; else 0."""
+    alike = (bend >= 0.0) | (bend >= extrema.ALIKE * (bend - change))
+    return where((last <= most * before) & alike, smooth, 0.0)
 
 
 def _smooth_of_differences(differences, count, smooth):
     """`smooth` of outputs whose differences fade with their order; 0 where a jump or a corner is among the looks."""
     n = minimum(count, float(LOOKS))
-    late = n - where(n < _FEW, 1.0, 2.0)
+    late = n - where(n < _FEW, 1.0, where(n < float(LOOKS), 2.0, 3.0))
     most = where(n < _FEW, _FADED_OF_FEW / (n - 3.0), _FADED)
     before = last = map_fields(_none, smooth)
     for order in range(2, LOOKS):
         difference, mask = take_stage(differences, order, smooth), late <= float(order)
         before = map_fields(_sum_of_sizes, before, difference, not mask)
-        last = map_fields(_sum_of_sizes, last, difference, mask & (n > float(order)))
-    return map_fields(_smooth_where_faded, smooth, before, last, most)
+        last = map_fields(_largest_size, last, difference, mask & (n > float(order)))
+    bend, change = take_stage(differences, 2, smooth), take_stage(differences, 3, smooth)
+    return map_fields(_smooth_where_faded, smooth, before, last, most, bend, change)
 
 
 smooth_of_differences = compile_callable(_smooth_of_differences)
@@ -308,8 +317,9 @@ search_fall = compile_inline(_search_fall)
 
 
 def _search(looks, number, t, h, count, closing, lanes, smooth, best, when, last):
-    """Running extrema after a search on the polynomial: beside the look before the newest; beside all before in lanes
-    that have just got the looks for it; if `closing` beside the newest, and beside all where looks are fewer.
+    """Running extrema after a search on the polynomial: of crests beside the look two before the newest, since a corner
+    shows itself by the looks behind it, and of falls beside the one before; beside all before in lanes that have just
+    got the looks for it; if `closing` beside the last two, and beside all where looks are fewer.
 
     number, t : of the newest look, its time [s];  count : how many looks its motion has had
     """
@@ -319,10 +329,12 @@ def _search(looks, number, t, h, count, closing, lanes, smooth, best, when, last
     everywhere = lanes & ((count < float(LOOKS)) if closing else (count == float(LOOKS)))
     for i in range(LOOKS - nearest):
         back = LOOKS - 1 - i
-        mask = (lanes if back == nearest else everywhere) & (count > float(back))
-        if any_lane(mask):
-            best, when = search_crest(looks, newest, back, t, h, count, mask, smooth, best, when)
-            last = search_fall(looks, newest, back, t, h, count, mask, last)
+        is_due, known = back < 2 if closing else back == 2, count > float(back)
+        crests, falls = known & (lanes if is_due else everywhere), known & (lanes if back == nearest else everywhere)
+        if (closing or back > 1) and any_lane(crests):
+            best, when = search_crest(looks, newest, back, t, h, count, crests, smooth, best, when)
+        if any_lane(falls):
+            last = search_fall(looks, newest, back, t, h, count, falls, last)
     return best, when, last
 
 
@@ -345,13 +357,13 @@ def _track_by_all(looks, number, t, h, closing, lanes, count, smooth, seen, last
     put_stage(looks.lasts, place, select(lanes, lasts[1], take_stage(looks.lasts, place, last)))
     # around the end of a motion the parabola has to do, one look later, when five tell of a jump
     beside = (looks.count < 3.0) | ((looks.count < 4.0) & (count <= looks.count))
-    corner, v1, v2, v3 = map_fields(_at_corner, smooth, beside), seen[2], seen[3], seen[4]
+    corner = map_fields(_at_corner, smooth, beside)
     best, when = track_by_three(number, t, h, False, lanes, corner, seen, best, when)
     if closing:
         corner = map_fields(_at_corner, smooth, count < 4.0)
         best, when = track_by_three(number, t, h, True, lanes, corner, newest_twice(seen), best, when)
     last = last_above(number, t, h, lanes, lanes & (count < 2.0), lasts, last)
-    crests = any_field(map_fields(_smooth_crest, v1, v2, v3, best, smooth))
+    crests = any_field(map_fields(_smooth_crest, seen[1], seen[2], seen[3], best, smooth))
     falls = any_field(map_fields(extrema.falls, lasts[0], lasts[1], lanes))
     wanted = lanes & ((count == float(LOOKS)) | ((crests | falls) & (count > float(LOOKS))))
     if any_lane(wanted):
@@ -372,7 +384,7 @@ def _track(past, number, t, h, closing, lanes, smooth, seen, lasts, best, when, 
     if any_lane(crests):  # of outputs with corners that is all
         when = map_fields(extrema.end_time, when, best, v2, grid_time(number - 1, h, t), crests, best)
         best = map_fields(extrema.end_value, best, v2, crests)
-    smooth_crests = any_field(map_fields(_smooth_crest, v1, v2, v3, best, smooth))
+    smooth_crests = any_field(map_fields(_smooth_crest, seen[1], v1, v2, best, smooth))
     falls = any_field(map_fields(extrema.falls, lasts[0], lasts[1], lanes))
     if closing or any_lane(lanes & (smooth_crests | falls | (count <= float(LOOKS)))):
         best, when, last = track_by_all(

@@ -113,8 +113,10 @@ def test_a_corner_or_a_jump_among_the_looks_makes_no_extreme_of_the_polynomial()
     for name in ("lit", "relay"):  # by the polynomial up to 2.3, by a parabola that ends at the jump 1.25
         np.testing.assert_array_equal(columns[f"{name}_top"], 1.0)
         np.testing.assert_array_equal(columns[f"{name}_bottom"], 0.0 if name == "lit" else -1.0)
-    over = columns["limited_top"] - 1.0  # by the polynomial always, by up to 0.08
-    assert np.mean(over > 0.0) < 0.1  # the looks may tell of no corner, in a motion of few above all
+    step = 0.05  # in which the wave rises by 0.09; three motions, each with a limit in its midst
+    finer = replace(CORNERS, clock=replace(CORNERS.clock, step=step, until=9.0))
+    finer = flown(by(finer, "abm8"), phase_rad=np.linspace(0.0, 0.4, 400))
+    assert (finer["limited_top"] - 1.0).max() < 0.005 * step  # by the polynomial up to 0.2 of the rise
     np.testing.assert_allclose(columns["wave_top"], 2.0, rtol=1e-6)
 
 
