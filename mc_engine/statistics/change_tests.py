@@ -34,6 +34,7 @@ from scipy.optimize import brentq
 from scipy.stats import binomtest, fisher_exact, norm, rankdata, t
 
 from mc_engine.statistics.moments import in_units, near_one
+from mc_engine.statistics.picked_cases import picked_rows
 
 FEWEST = 10  # numbers in each run, or pairs, for a test of a metric
 MOST_CASES = 200_000
@@ -152,7 +153,7 @@ def metric_change(
     if min(used) < FEWEST:
         shift = Estimate(float(in_units(mean[1] - mean[0], exponent)), -inf, inf)
         return MetricChange(*described, shift, UNKNOWN, np.nan, np.nan)
-    a, b = (values[:: -(-values.size // MOST_CASES)] for values in (a, b))
+    a, b = (values[picked_rows(values.size, MOST_CASES)] for values in (a, b))
     z = float(norm.ppf(0.5 + 0.5 * confidence))
     if max(np.ptp(a), np.ptp(b), abs(a[0] - b[0])) <= unit:  # the same constant
         same = float(in_units(float(np.median(b) - np.median(a)), exponent))

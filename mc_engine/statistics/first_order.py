@@ -17,6 +17,7 @@ from mc_engine.statistics.input_columns import (
     input_columns,
     rank_correlations,
 )
+from mc_engine.statistics.picked_cases import picked_rows
 
 MOST_BINS = 100
 FEWEST_CASES = 20
@@ -121,7 +122,7 @@ def contributors(inputs: Mapping[str, Any], values: np.ndarray, sobol: bool = Fa
     """
     columns = input_columns(inputs)
     rows = np.flatnonzero(np.isfinite(values) & finite_rows(columns, len(values)))
-    rows = rows[:: -(-rows.size // MOST_CASES) or 1]
+    rows = rows[picked_rows(rows.size, MOST_CASES)]
     live = [column for column in (input_column.at(rows) for input_column in columns) if column.varies]
     table = np.asarray(values, dtype=np.float64)[rows, None]
     if rows.size < FEWEST_CASES or not np.ptp(table) > 1e-12 * np.abs(table).max():

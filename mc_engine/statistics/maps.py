@@ -22,6 +22,7 @@ import numpy as np
 import scipy  # loads its packages when they are used
 
 from mc_engine.statistics.moments import in_units, near_one
+from mc_engine.statistics.picked_cases import picked_rows
 
 FEWEST = 24
 NEIGHBOURS = (24, 36, 54, 80, 120, 180, 270, 400, 600, 900)  # to choose from
@@ -203,7 +204,7 @@ class _Cloud:
     def of(cls, x: np.ndarray, y: np.ndarray) -> "_Cloud | None":
         """None for cases on a line."""
         ends = np.array([[x.min(), x.max()], [y.min(), y.max()]])
-        rows = np.unique(np.linspace(0, x.size - 1, min(x.size, MOST_CASES)).astype(np.int64))
+        rows = picked_rows(x.size, MOST_CASES)
         x, y = x[rows], y[rows]
         centre, scale = np.array([x.mean(), y.mean()]), np.array([x.std(), y.std()])
         places = (np.column_stack([x, y]) - centre) / scale
@@ -259,7 +260,7 @@ def _chosen_neighbours(cloud: _Cloud, metrics: Sequence[np.ndarray]) -> list[tup
     A smaller number is chosen where it predicts as well.
     """
     places, n = cloud.places, len(cloud.places)
-    rows = np.unique(np.linspace(0, n - 1, min(n, LEFT_OUT)).astype(np.int64))
+    rows = picked_rows(n, LEFT_OUT)
     choices = [number for number in NEIGHBOURS if number < n]
     if len(choices) < 2:
         return [(min(NEIGHBOURS[0], n), 1.0) for _ in metrics]  # too few cases to leave any out

@@ -11,6 +11,7 @@ import numpy as np
 import scipy  # loads its packages when they are used
 
 from mc_engine.statistics.order_statistics import quantile_ranks
+from mc_engine.statistics.picked_cases import picked_rows
 
 CONTENTS = (0.5, 0.9, 0.99)
 FEWEST = 3  # points of an ellipse
@@ -193,16 +194,18 @@ def density_regions(
 ) -> tuple[DensityRegion, ...]:
     """Regions of any shape for points float64[n, 2]; those contents left out that the points are too few for.
 
-    A kernel density is made of every second point; the points between rank themselves by it, and the level is
-    the order statistic below which at most 1 - content of the population lies, with the confidence (Wilks).  That
+    A kernel density is made of half of the points, one of each two; the others rank themselves by it, and the level
+    is the order statistic below which at most 1 - content of the population lies, with the confidence (Wilks).  That
     holds whatever the distribution and however poor the density: Lei, Robins & Wasserman, J. Am. Stat. Assoc. 108
     (2013), 278-287.
     """
-    smoothed = Density.of(points[::2], thinnest)
+    smoothing = np.zeros(len(points), dtype=bool)
+    smoothing[picked_rows(len(points), (len(points) + 1) // 2)] = True
+    smoothed = Density.of(points[smoothing], thinnest)
     if smoothed is None:
         return ()
     values = smoothed.at(points)
-    ranked = np.sort(values[1::2])
+    ranked = np.sort(values[~smoothing])
     regions = []
     for content in contents:
         rank = quantile_ranks(ranked.size, 1.0 - content, 2.0 * confidence - 1.0)[0]

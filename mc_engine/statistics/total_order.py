@@ -25,6 +25,7 @@ from scipy.special import chdtrc, eval_legendre, ndtri
 
 from mc_engine.statistics.first_order import first_order
 from mc_engine.statistics.input_columns import InputColumn, average_ranks
+from mc_engine.statistics.picked_cases import picked_rows
 
 FEWEST_CASES = 200  # with which 75 to 95 % of 90 % intervals, with what is unexplained above them, hold
 MOST_DEGREE = 12  # of a single input, and of a product in all
@@ -33,7 +34,7 @@ SCREENED_DEGREE = 3  # of each input while pairs are looked for
 MOST_PAIRS = 40  # a metric, strongest first
 MOST_TRIPLES = 20
 MOST_TERMS = 300  # a metric
-MOST_VALUES = 1_000_000  # inputs times cases; of more cases an even choice is taken
+MOST_VALUES = 1_000_000  # inputs times cases; of more cases some are picked
 FEWEST_PICKED = 5_000  # cases of that choice
 CASES_PER_TERM = 10
 FALSE_TERMS = 0.05  # chance that any term of a metric without effects is taken for one that surely is there
@@ -64,7 +65,7 @@ def total_order(columns: Sequence[InputColumn], table: np.ndarray) -> tuple[np.n
     that of chance in the cases and the fit; what is unexplained is not part of it.
     """
     most = max(MOST_VALUES // len(columns), FEWEST_PICKED)
-    rows = np.linspace(0, len(table) - 1, min(most, len(table))).astype(np.int64)
+    rows = picked_rows(len(table), most)
     columns, table = [column.at(rows) for column in columns], table[rows]
     n, n_metrics = table.shape
     basis = [_functions(column, n) for column in columns]

@@ -17,6 +17,7 @@ import pandas as pd
 
 from mc_engine.errors import EngineError
 from mc_engine.statistics import map_metric, summarize
+from mc_engine.statistics.picked_cases import picked_rows
 from mc_engine.status import OK, STATUS_NAME
 from reports.drawing import paper
 from reports.drawing.marks import Drawing, Points
@@ -90,7 +91,7 @@ def fuel_map(table: pd.DataFrame, x: str, y: str, metric: str) -> Picture:
     if surface is None or not np.isfinite(surface.value).any():
         raise EngineError(f"{metric}: too few cases over {x} and {y} for a map; draw a scatter instead")
     used = np.flatnonzero(np.isfinite(a) & np.isfinite(b) & np.isfinite(c))
-    shown = used[np.linspace(0, used.size - 1, min(used.size, POINTS_ON_MAP)).astype(np.int64)]
+    shown = used[picked_rows(used.size, POINTS_ON_MAP)]
     labels = _label(table, x), _label(table, y), _label(table, metric)
     points, unit = np.column_stack([a[shown], b[shown]]), _unit(table, metric)
     return Picture(

@@ -8,6 +8,7 @@ import numpy as np
 from mc_engine.model.figures import FootprintFigure
 from mc_engine.statistics import clopper_pearson, summarize
 from mc_engine.statistics.footprint import Footprint
+from mc_engine.statistics.picked_cases import picked_rows
 from mc_engine.statistics.regions import DensityRegion, Ellipse, next_case_scale
 from reports.document.blocks import Attachment, Cell, Column, FigureBlock, Table
 from reports.drawing.marks import Drawing, Line, Points, nominal_ring
@@ -296,7 +297,7 @@ def _distance_row(flown: Flown, landing: Landing, place: Mark) -> tuple[Cell, ..
 def _map_places(flown: Flown, landing: Landing) -> Places:
     rows = landing.rows
     if rows.size > PLACES_IN_A_FILE:
-        rows = rows[np.linspace(0, rows.size - 1, PLACES_IN_A_FILE).astype(np.int64)]
+        rows = rows[picked_rows(rows.size, PLACES_IN_A_FILE)]
     title = str(flown.campaign.get("title") or flown.name)
     note = f"{landing.figure.title}; {count(rows.size)} of {count(flown.n_held)} cases"
     status = [str(word) for word in flown.cases["status"].iloc[rows]]

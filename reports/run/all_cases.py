@@ -19,6 +19,7 @@ import pyarrow.compute as pc
 
 from mc_engine.runner.summary import metric_parts, streamed
 from mc_engine.statistics import Summary, Verdict, judge_all, summarize, was_looked_at, worst_cases
+from mc_engine.statistics.picked_cases import picked_rows
 from mc_engine.statistics.requirements import LimitCounts
 from mc_engine.statistics.worst import Limits, WorstSoFar, limits_on
 from mc_engine.status import OK, STATUS_NAME
@@ -248,10 +249,7 @@ class _FirstPass:
     def _sampled_rows(self) -> np.ndarray:
         """Row numbers of the sample, int64, ascending."""
         most = max(min(MOST_SAMPLED, MOST_CELLS // len(self.run.columns), self.n_tried), 1)
-        bounds = np.linspace(0, self.n_tried, most + 1).astype(np.int64)
-        seed = int(self.run.manifest["campaign"].get("seed") or 0)
-        draw = np.random.Generator(np.random.Philox(seed)).random(most)
-        return bounds[:-1] + (draw * np.diff(bounds)).astype(np.int64)
+        return picked_rows(self.n_tried, most, int(self.run.manifest["campaign"].get("seed") or 0))
 
     def passes(self, metrics: Sequence[str]) -> Iterator[dict[str, np.ndarray]]:
         """The parts for `stream`; what the first pass finds is noted on its way."""

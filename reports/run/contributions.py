@@ -14,6 +14,7 @@ import scipy  # loads its packages when they are used
 
 from mc_engine.statistics.moments import number_or_none
 from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
+from mc_engine.statistics.picked_cases import picked_rows
 from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, sensitivity
 from mc_engine.store.opening import open_store
 from mc_engine.store.run_files import SENSITIVITY, is_run_directory
@@ -147,7 +148,7 @@ def _of_table(flown: "Flown", metrics: list[str]) -> Contributions | None:
     inputs = {name: values for name, values in flown.inputs.items() if name not in flown.draws}
     if not inputs:
         return None
-    rows = np.arange(flown.n_held)[:: -(-flown.n_held // MOST_ROWS)]
+    rows = picked_rows(flown.n_held, MOST_ROWS)
     indices = sensitivity(
         {name: values[rows] for name, values in inputs.items()},
         {name: flown.values(name)[rows] for name in metrics},

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mc_engine.statistics.input_columns import average_ranks
+from mc_engine.statistics.picked_cases import picked_rows
 from reports.document.blocks import FigureBlock
 from reports.drawing.marks import Drawing
 from reports.figures.statistics import correlation_matrix, probability_plot
@@ -23,7 +24,7 @@ def correlation_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     if not flown.random or flown.n_held < FEWEST_CASES:
         yield f"Not drawn: correlations need {FEWEST_CASES} cases that were drawn at random."
         return
-    rows = np.arange(flown.n_held)[:: -(-flown.n_held // MOST_CASES)]
+    rows = picked_rows(flown.n_held, MOST_CASES)
     metrics = [name for name in flown.key_metrics if not flown.summaries[name].constant]
     table = {name: flown.values(name)[rows] for name in [*metrics[:MOST_METRICS], *_inputs(flown, metrics)]}
     table = {name: values for name, values in table.items() if _varies(values)}

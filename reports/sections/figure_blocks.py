@@ -7,6 +7,7 @@ from math import ceil
 import numpy as np
 
 from mc_engine.model.figures import ScatterFigure
+from mc_engine.statistics.picked_cases import picked_rows
 from mc_engine.statistics.summary import nearly_equal
 from mc_engine.store.run_files import NOMINAL_CASE
 from reports.document.blocks import FigureBlock
@@ -41,7 +42,7 @@ def thinned_rows(rows: np.ndarray, always: np.ndarray, most: int = POINTS_SHOWN)
     """At most about `most` of the ascending row numbers: evenly through the table, those of `always` among them."""
     if rows.size <= most:
         return rows
-    even = rows[np.linspace(0, rows.size - 1, most).astype(np.int64)]
+    even = rows[picked_rows(rows.size, most)]
     place = np.minimum(np.searchsorted(rows, always), rows.size - 1)
     return np.union1d(even, always[rows[place] == always])
 
@@ -54,7 +55,7 @@ def thinned_by_outcome(rows: np.ndarray, outcome: np.ndarray) -> np.ndarray:
     share = min(1.0, POINTS_SHOWN / max(rows.size, 1))
     groups = [rows[outcome[rows] == kind] for kind in np.unique(outcome[rows])]
     kept = [max(round(share * group.size), min(FEWEST_SHOWN, group.size)) for group in groups]
-    chosen = [group[np.linspace(0, group.size - 1, n).astype(np.int64)] for group, n in zip(groups, kept, strict=True)]
+    chosen = [group[picked_rows(group.size, n)] for group, n in zip(groups, kept, strict=True)]
     return np.sort(np.concatenate(chosen)) if chosen else rows
 
 

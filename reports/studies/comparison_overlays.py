@@ -6,6 +6,7 @@ import numpy as np
 
 from mc_engine.model.figures import FootprintFigure, HistoryFigure
 from mc_engine.statistics.geodesy import ELLIPSOIDS, WGS84, middle_plane
+from mc_engine.statistics.picked_cases import picked_rows
 from mc_engine.store.run_files import NOMINAL_CASE
 from reports.document.blocks import FigureBlock
 from reports.drawing.marks import Axis, Band, Drawing, Line, Plot, Points, between, to_scale
@@ -118,7 +119,7 @@ def _footprint(runs: tuple[Flown, Flown], figure: FootprintFigure) -> Plot | Non
         return None
     marks = []
     for run, (latitude, longitude) in enumerate(places):
-        rows = np.unique(np.linspace(0, latitude.size - 1, min(latitude.size, MOST_POINTS)).astype(np.int64))
+        rows = picked_rows(latitude.size, MOST_POINTS)
         points = plane.points(latitude[rows], longitude[rows]) / 1000.0
         key = f"{NAMES[run]}: impact points"
         marks.append(Points(points[:, 0], points[:, 1], COLOURS[run], NAMES[run], SIGNS[run], opacity=0.5, key=key))
