@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.statistics.drivers import FALSE_DISCOVERIES, FEWEST, Driver, Drivers, failure_drivers, success_along
+from mc_engine.statistics.drivers import FALSE_DISCOVERIES, Driver, Drivers, failure_drivers, success_along
 from reports.contributors.companion import companion_blocks, no_contributors
 from reports.contributors.designed_indices import designed_blocks
 from reports.document.blocks import Cell, Column, FigureBlock, Table
@@ -21,6 +21,10 @@ _RANDOM_DRAWS_ALONE = (
     "The cases differ in their random draws alone, which cause all of the variance. To see contributors, list inputs "
     "under [dispersion] in the campaign file; a section [sensitivity] computes their contributions from flights of "
     "their own."
+)
+_NO_PAIRS = (
+    "Pairs of inputs are not tested for contributors to failures: Sobol’ points are not independent, and pairs without "
+    "effect would be found too often. Of the designs mc and lhs pairs are tested."
 )
 
 
@@ -56,20 +60,22 @@ def sensitivity_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
 def _driver_blocks(
     flown: Flown, inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray]
 ) -> Iterator[FigureBlock | Table | str]:
-    drivers = failure_drivers(inputs, failed)
+    drivers = failure_drivers(inputs, failed, sobol=flown.design == "sobol")
     if drivers.singles or drivers.pairs:
         yield _driver_table(flown, drivers, failed)
     elif drivers.singles_tested:
         yield (
-            f"No input, and no pair of inputs, separates failed from passed cases beyond chance "
-            f"({count(drivers.singles_tested)} tests of single inputs, {count(drivers.pairs_tested)} of pairs, at a "
-            f"false-discovery rate of {percent(FALSE_DISCOVERIES)})."
+            f"No input{', and no pair of inputs,' * bool(drivers.pairs_tested)} separates failed from passed cases "
+            f"beyond chance ({count(drivers.singles_tested)} tests of single inputs, {count(drivers.pairs_tested)} of "
+            f"pairs, at a false-discovery rate of {percent(FALSE_DISCOVERIES)})."
         )
     if drivers.undecided:
         yield (
-            f"Not tested for contributors to failures, fewer than {FEWEST} cases failed or fewer than {FEWEST} passed: "
-            f"{', '.join(drivers.undecided)}."
+            f"Not tested for contributors to failures, fewer than {drivers.fewest} cases failed or fewer than "
+            f"{drivers.fewest} passed: {', '.join(drivers.undecided)}."
         )
+    if flown.design == "sobol" and drivers.singles_tested and len(inputs) > 1:
+        yield _NO_PAIRS
     if drivers.singles:
         yield _success_figure(flown, drivers.singles[:MOST_PANELS], inputs, failed)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from mc_engine.sampling.designs import unit_cube
 from mc_engine.sampling.streams import uniforms
 from mc_engine.statistics import clopper_pearson
 from mc_engine.statistics.drivers import MOST_ROWS, _adjusted, _tested_rows, failure_drivers, success_along
@@ -124,8 +125,20 @@ def test_of_very_many_cases_all_failed_ones_are_tested_and_an_even_choice_of_the
     assert np.isin(lost, rows).all()
     assert rows.size == lost.size + MOST_ROWS // 2
     assert (np.diff(rows) > 0).all()
-    assert np.diff(rows).max() <= 8
+    assert np.diff(rows).max() <= 12  # one of each six
     assert _tested_rows(failed[:, :MOST_ROWS], usable[:MOST_ROWS]).size == MOST_ROWS - 1
+
+
+def test_sobol_points_need_more_failed_cases_and_are_not_tested_for_pairs():
+    """The 14 points of 500 at the high end of the first input lie in one half of others, which have no effect."""
+    names = [f"x{k}" for k in range(10)]
+    inputs = dict(zip(names, map(stats.norm.ppf, unit_cube("sobol", 1, names, np.arange(500), 500)), strict=True))
+    few, enough = ({"limit": inputs["x0"] > least} for least in (1.9, 1.5))
+    assert len(failure_drivers(inputs, few).singles) > 1
+    assert failure_drivers(inputs, few, sobol=True).undecided == ("limit",)
+    found = failure_drivers(inputs, enough, sobol=True)
+    assert [driver.inputs for driver in found.singles] == [("x0",)]
+    assert found.pairs_tested == 0
 
 
 def test_success_along_an_input_counts_its_cases_and_has_exact_limits():

@@ -205,3 +205,12 @@ def test_a_scatter_plot_names_a_strongest_contributor_only_where_an_input_surely
     captions = {one.caption for one in blocks_of(build(run, "run"), FigureBlock)}
     assert "Propellant over its strongest contributor, ve." in captions
     assert captions & {"Settling time over ve.", "Settling time over oe."}
+
+
+def test_of_sobol_points_no_pair_is_tested_for_failures_and_the_page_says_so():
+    run = synthetic_run(4000, failed=30)
+    assert "Pairs of inputs are not tested" not in said(section(run))
+    run.manifest["campaign"]["design"] = "sobol"
+    found = said(section(run))
+    assert "Pairs of inputs are not tested for contributors to failures: Sobol’ points are not independent" in found
+    assert "no pair of inputs" not in found
