@@ -56,7 +56,7 @@ class SurfaceMap:
     n_tried : int, all cases
     n_smoothed : int, of the n_used cases, those that the surface was made of
     explained : float, fraction of the metric's variance that the surface predicts in cross-validation; 1 for an exact
-        grid
+        grid; NaN where the cases are too few for that, or lie on too few levels of an input
 
     >>> map_metric(np.tile([0.0, 1.0], 2), np.repeat([0.0, 1.0], 2), np.arange(4.0)).exact
     True
@@ -129,7 +129,7 @@ def _surface_maps(x: np.ndarray, y: np.ndarray, metrics: Sequence[np.ndarray], p
 
 
 def explained_share(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> float:
-    """Fraction of the variance of z that a smooth surface over x and y predicts; NaN for too few cases.
+    """Fraction of the variance of z that a smooth surface over x and y predicts; NaN for too few cases or levels.
 
     By cross-validation, with cases left out one at a time.
     """
@@ -263,7 +263,7 @@ def _chosen_neighbours(cloud: _Cloud, metrics: Sequence[np.ndarray]) -> list[tup
     rows = picked_rows(n, LEFT_OUT)
     choices = [number for number in NEIGHBOURS if number < n]
     if len(choices) < 2:
-        return [(min(NEIGHBOURS[0], n), 1.0) for _ in metrics]  # too few cases to leave any out
+        return [(min(NEIGHBOURS[0], n), np.nan) for _ in metrics]  # too few cases to leave any out
     distance, near = cloud.tree.query(places[rows], k=choices[-1] + 1)
     distance, near = distance[:, 1:], near[:, 1:]  # without the case itself
     scores: list[list[float]] = [[] for _ in metrics]
@@ -283,7 +283,7 @@ def _choice(choices: Sequence[int], scores: Sequence[float], variance: float) ->
     """The fewest neighbours that are as good as any, and the fraction of the variance that the best predict."""
     least = min(scores)
     chosen = next(number for number, score in zip(choices, scores, strict=False) if score <= AS_GOOD * least)
-    return chosen, 1.0 - least / max(variance, 1e-300) if least < np.inf else 1.0
+    return chosen, 1.0 - least / max(variance, 1e-300) if least < np.inf else np.nan
 
 
 def _surfaces(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mc_engine.statistics import map_metric
+from mc_engine.statistics.maps import explained_share
 
 
 def scattered(n=3000, key=1):
@@ -112,6 +113,13 @@ def test_a_hole_between_the_cases_stays_blank():
     far = np.hypot(*np.meshgrid(surface.x, surface.y))
     assert np.isnan(surface.value[far < 0.7]).all()
     assert np.isfinite(surface.value[(far > 1.1) & (far < 1.9)]).mean() > 0.99
+
+
+def test_what_no_cross_validation_can_tell_is_not_told_as_all_of_the_variance():
+    x, y = scattered(400)
+    noise = np.random.Generator(np.random.Philox(key=9)).normal(size=400)
+    assert np.isnan(explained_share(x[:30], y[:30], noise[:30]))  # too few to leave any out
+    assert np.isnan(explained_share(np.sign(x - np.median(x)), y, noise))  # no surface through two levels
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 23])
