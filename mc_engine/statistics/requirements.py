@@ -23,6 +23,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from mc_engine.sampling.designs import EXTENSIBLE
 from mc_engine.statistics import binomial, time_uniform, tolerance
 from mc_engine.statistics.tolerance import Judged
 
@@ -73,7 +74,8 @@ class Verdict:
         None with two limits
     enclosed : tuple or None, the two limits that they demonstrate, for a requirement with two: each moved inward by the
         same distance, the margin, or outward where that is negative
-    needed : int or None, cases that would demonstrate the share if no further one failed; None if it is decided
+    needed : int or None, cases that the run would have to be extended to (of a design that cannot be, cases of another
+        run) to demonstrate the share if no further one failed; None if it is decided
     accepted : int or None, most failures with which so many cases pass; None if they cannot
     consumer_risk : float or None, probability of passing a system that just misses the share; None where the number of
         cases was decided along the way, and then it is at most 1 - confidence
@@ -280,6 +282,7 @@ def _verdict(
     among: int,
 ) -> Verdict:
     limits: ShareLimits = time_uniform if looked else binomial
+    further: ShareLimits = time_uniform if design in EXTENSIBLE else limits  # an extended run is judged by it
     share, confidence = float(requirement["share"]), float(requirement["confidence"])
     tried = counts.tried
     passed = tried - counts.outside(which)
@@ -305,7 +308,7 @@ def _verdict(
         upper=upper,
         demonstrated=None,
         enclosed=None,
-        needed=limits.smallest_sample(share, confidence, tried - passed)
+        needed=further.smallest_sample(share, confidence, tried - passed)
         if random and outcome == NOT_DEMONSTRABLE
         else None,
         accepted=accepted,

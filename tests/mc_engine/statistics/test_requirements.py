@@ -23,8 +23,15 @@ def test_no_failure_in_2302_cases_shows_0999_with_90_percent_confidence():
 @pytest.mark.parametrize(("failures", "tried"), [(0, 852), (1, 1440), (2, 1970), (3, 2473)])
 def test_the_verdict_turns_to_pass_at_the_known_sample_sizes(failures, tried):
     assert judge(FUEL, *cases(tried - failures, failures)).outcome == "pass"
-    short = judge(FUEL, *cases(tried - failures - 1, failures))
+    short = judge(FUEL, *cases(tried - failures - 1, failures), "lhs")
     assert (short.outcome, short.needed) == ("not demonstrable", tried)
+
+
+@pytest.mark.parametrize("design", ["mc", "sobol"])
+def test_a_run_that_is_extended_to_the_cases_needed_demonstrates_the_share(design):
+    short = judge(FUEL, *cases(498, 2), design)
+    extended = [judge(FUEL, *cases(n - 2, 2), design, looked=True) for n in (short.needed - 1, short.needed)]
+    assert [verdict.outcome for verdict in extended] == ["not demonstrable", "pass"]
 
 
 def test_a_share_below_its_own_upper_bound_fails():
@@ -211,7 +218,7 @@ def test_a_shared_confidence_asks_more_of_each():
     alone = both([0.5] * 1000, [6.0] * 1000)[0][0]
     assert (alone.outcome, alone.shared_outcome) == ("pass", "not demonstrable")  # 852 at 90 %, 1259 at 96.67 %
     verdicts, joint = both([0.5] * 500, [6.0] * 500)
-    assert joint.needed == verdicts[1].needed > verdicts[0].needed == 852  # speed, with 95 %, takes the most
+    assert joint.needed == verdicts[1].needed > verdicts[0].needed == 1104  # speed, with 95 %, takes the most
     enough = both([0.5] * 1259, [6.0] * 1259)[0][0]
     assert enough.shared_outcome == "pass"
     assert judge(FUEL, *cases(852, 0)).shared_outcome == "pass"  # a single one shares with none
