@@ -31,16 +31,21 @@ def widest(lines: Sequence[str]) -> float:
 
 
 def wrapped(text: str, room: float, most: int = 9) -> list[str]:
-    """Lines not wider than `room`, but for single words; what goes beyond `most` lines is left on the last."""
+    """Lines not wider than `room`, but for single words; what goes beyond `most` lines is left on the last.
+
+    A word that is wider, such as the name of a requirement, is broken behind its underscores.
+    """
     lines: list[str] = []
     for paragraph in text.split("\n") if text else ():
         lines.append("")
         for word in paragraph.split(" "):
-            longer = f"{lines[-1]} {word}".lstrip()
-            if lines[-1] and width(longer) > room and len(lines) < most:
-                lines.append(word)
-            else:
-                lines[-1] = longer
+            pieces = re.findall("[^_]+_*|_+", word) if width(word) > room else [word]
+            for place, piece in enumerate(pieces):
+                longer = f"{lines[-1]}{'' if place else ' '}{piece}".lstrip(" ")
+                if lines[-1] and width(longer) > room and len(lines) < most:
+                    lines.append(piece)
+                else:
+                    lines[-1] = longer
     return lines
 
 

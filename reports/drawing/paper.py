@@ -155,10 +155,12 @@ class _Panel:
     def __init__(self, plot: Plot, left: float, width: float):
         self.plot, self.left, self.right = plot, left, left + width
         self.height = max(SHORT * plot.height, _room_of_words(plot.y))
-        self.title = lettering.wrapped(plot.title, (width - 4.0) / lettering.BOLD, 3)
+        room = (width - 4.0) / lettering.BOLD
+        self.title = lettering.wrapped(plot.title, room, 3)
+        self.bold = len(lettering.wrapped(plot.title.partition("\n")[0], room, 3))
         self.ends = plot.ends
         self.y_ticks = _ticks(plot.y, self.ends[1], self.height, True)
-        self.y_label = _label(plot.y, self.y_ticks, self.height + 12.0)
+        self.y_label = _label(plot.y, self.y_ticks, self.height + (0.0 if self.title else 12.0))
         self.frame_left = left + self.y_ticks.widest + 5.0 + LINE * len(self.y_label)
         room = self.right - 5.0 - self.frame_left
         if plot.equal:
@@ -174,8 +176,8 @@ class _Panel:
         """SVG elements, its title from `top` on, its axes from `upper` to `lower`; clip : a name of its own."""
         logs = self.plot.x.log, self.plot.y.log
         frame = Frame(self.frame_left, upper, self.right - 5.0, lower, *self.ends, *logs)
-        yield from lettering.text(self.left, top + LINE - 1.0, self.title[:1], bold=True)
-        yield from lettering.text(self.left, top + 2.0 * LINE - 1.0, self.title[1:])
+        yield from lettering.text(self.left, top + LINE - 1.0, self.title[: self.bold], bold=True)
+        yield from lettering.text(self.left, top + LINE * (self.bold + 1) - 1.0, self.title[self.bold :])
         left, right = f"M{frame.left:.2f}", f"H{frame.right:.2f}"
         lines = [f"M{x:.2f} {upper:.2f}V{lower:.2f}" for x in frame.x(self.x_ticks.places)]
         lines += [f"{left} {y:.2f}{right}" for y in frame.y(self.y_ticks.places)]

@@ -24,6 +24,8 @@ ABOVE, ROUND_TITLE = 12, 6  # pixels above the axes; more of them where there is
 PAD, CAPITAL = 7, 9  # pixels above a title; more of them above two lines, where plotly forgets the first one's height
 WRAP = 28  # characters of a line of a title, and of the label below a panel
 UPRIGHT = 9  # pixels of height for a character of the label beside a panel
+NAME, LETTER = 36, 7  # characters of a line of a name along an axis; pixels of one
+SIDE_BY_SIDE = 600  # pixels of all names below a panel that stand level
 LONG = 8  # characters of a tick label; of longer ones there are few, or they turn and take the room of the panel
 FRAME = 56  # pixels above and below the rows of a panel that has rows
 SERIES = "<extra>%{fullData.name}</extra>"  # of a hover text: the name of the mark beside it
@@ -158,6 +160,12 @@ def _lines(text: str, characters: int) -> str:
     return "<br>".join(map(plain, lines))
 
 
+def _room_below(axis: Axis) -> int:
+    """Pixels that names below a panel take where they stand upright: without them plotly takes those of its rows."""
+    longest = max((len(line) for _, text in axis.ticks or () for line in wrap(text, NAME)), default=0)
+    return LETTER * longest if LETTER * longest * len(axis.ticks or ()) > SIDE_BY_SIDE else 0
+
+
 def _axis(axis: Axis, ends: tuple[float, float], characters: int) -> dict[str, Any]:
     """The layout of one axis, in the colours of the page; characters : of a line of its label."""
     own, places = axis.ticks, axis_ticks(*ends, MOST_TICKS, log=axis.log)
@@ -173,7 +181,8 @@ def _axis(axis: Axis, ends: tuple[float, float], characters: int) -> dict[str, A
         "range": [float(np.log10(end)) for end in ends] if axis.log else list(ends),
         "type": "log" if axis.log else "linear",
         **({"tickformat": ",d"} if axis.whole else {}),
-        **({} if own is None else {"tickvals": [at for at, _ in own], "ticktext": [plain(text) for _, text in own]}),
+        **({} if own is None else {"tickvals": [at for at, _ in own],
+                                   "ticktext": [_lines(text, NAME) for _, text in own]}),
     }  # fmt: skip
 
 
@@ -187,7 +196,8 @@ def _layout(plot: Plot) -> dict[str, Any]:
     return {
         "title": {"text": title, "font": {"size": 12.5}, "x": 0.0, "xref": "container", "y": 1.0,
                   "yref": "container", "yanchor": "top", "pad": {"t": PAD + (CAPITAL if lines > 1 else 0)}},
-        "height": round(plot.height + TITLE_LINE * max(lines - 1, 0) + (FRAME if plot.y.ticks else 0)),
+        "height": round(plot.height + TITLE_LINE * max(lines - 1, 0) + (FRAME if plot.y.ticks else 0)
+                        + _room_below(plot.x)),
         "margin": {"l": 50, "r": 14, "t": top, "b": 44, "pad": 0},
         "font": {"family": "inherit", "size": 12, "color": INK},
         "paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)",

@@ -38,7 +38,8 @@ def history_envelopes(histories: pd.DataFrame, case_ids: Sequence[int], names: S
     """Envelopes of the quantities over these cases; none if the cases are too few.
 
     Between its own rows a flight is a straight line; after its end it counts no more.  Where so few still fly that they
-    do not support the outer percentiles, these end.
+    do not support the outer percentiles, these end, and the median where fewer than FEWEST_CASES do; smallest and
+    largest go on to the end of the longest flight.
     """
     if len(case_ids) < FEWEST_CASES:
         return {}
@@ -67,8 +68,6 @@ def _envelope(grid: np.ndarray, times: list[np.ndarray], values: list[np.ndarray
     rows = [np.interp(grid, t, y, right=np.nan) for t, y in zip(times, values, strict=True)]
     table = np.sort(np.array(rows), axis=0)  # flights that have ended last, as not-a-numbers
     flying = np.count_nonzero(np.isfinite(table), axis=0)
-    used = flying >= FEWEST_CASES
-    table, flying = table[:, used], flying[used]
     curves = {}
     for probability in envelope_probabilities(len(times)):
         place = probability * (flying - 1)
@@ -76,6 +75,7 @@ def _envelope(grid: np.ndarray, times: list[np.ndarray], values: list[np.ndarray
         high = np.minimum(low + 1, flying - 1)
         columns = np.arange(flying.size)
         below, above = table[low, columns], table[high, columns]
-        supported = (flying * min(probability, 1.0 - probability) >= 1.0) | (probability in (0.0, 1.0))
+        enough = (flying >= FEWEST_CASES) & (flying * min(probability, 1.0 - probability) >= 1.0)
+        supported = enough | (probability in (0.0, 1.0))
         curves[probability] = np.where(supported, below + (place - low) * (above - below), np.nan)
-    return Envelope(grid[used], curves, len(times))
+    return Envelope(grid, curves, len(times))

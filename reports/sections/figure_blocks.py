@@ -269,7 +269,8 @@ def _envelope_words(flown: Flown, envelopes: dict[str, Envelope]) -> Iterator[st
         yield (
             f"Envelopes: smallest to largest, {percent(outer, 3)} to {percent(1.0 - outer, 3)}"
             f"{why if outer > OUTER[0] else ''}, and median of the first {count(n)} cases, "
-            "at every time of those that still fly. These cases were saved whatever their result."
+            f"at every time of those that still fly: of fewer than {FEWEST_CASES}, smallest to largest alone. "
+            "These cases were saved whatever their result."
         )
     elif flown.random:
         yield (

@@ -20,6 +20,7 @@ from reports.drawing.strokes import Frame, stroked
 from reports.figures.distributions import bin_edges
 from reports.figures.histories import thinned
 from reports.figures.rows import margin_figure
+from reports.figures.statistics import correlation_matrix
 from reports.text.numbers import same_lengths
 
 PLOT = Plot((), Axis("x"), Axis("y"), "", 240.0)
@@ -52,11 +53,29 @@ def test_two_lengths_in_one_unit_are_to_scale_unless_the_cloud_is_much_longer_th
     assert ("scaleanchor" in screen.specifications(Drawing("", (plot,)))[0]["layout"]["yaxis"]) == to_scale
 
 
-def test_the_bold_line_of_a_panels_title_is_as_wide_as_the_panel_at_most():
-    title = "limits 1\u202f234\u202f467.890123 and 1\u202f234\u202f667.890123 beyond the axis"
+@pytest.mark.parametrize(
+    "title",
+    [
+        "limits 1\u202f234\u202f467.890123 and 1\u202f234\u202f667.890123 beyond the axis",
+        "apoapsis_within_the_capability_of_the_orbit_trim_manoeuvres",
+    ],
+)
+def test_a_title_is_bold_to_its_end_and_as_wide_as_its_panel_at_most(title):
     panel = replace(PLOT, title=title)
-    (bold, *_) = re.findall('font-weight="bold">([^<]*)<', paper.svg(Drawing("", (panel, panel), 2)))
-    assert lettering.BOLD * lettering.width(bold) <= 0.5 * (paper.WIDTH - paper.GAP)
+    bold = re.findall('font-weight="bold">([^<]*)<', paper.svg(Drawing("", (panel, panel), 2)))
+    assert re.sub("[ _]", "", "".join(bold)) == 2 * re.sub("[ _]", "", title)
+    assert max(lettering.BOLD * lettering.width(line) for line in bold) <= 0.5 * (paper.WIDTH - paper.GAP)
+
+
+def test_names_that_stand_upright_below_a_matrix_take_no_room_of_its_rows():
+    names = [f"aerodynamic coefficient with a long name, number {k}" for k in range(8)]
+    layouts = [
+        screen.specifications(Drawing("", (correlation_matrix(some, np.eye(8)),)))[0]["layout"]
+        for some in (names, [name[-1] for name in names])
+    ]
+    line = max(len(part) for text in layouts[0]["xaxis"]["ticktext"] for part in text.split("<br>"))
+    assert line <= screen.NAME
+    assert layouts[0]["height"] - layouts[1]["height"] == line * screen.LETTER
 
 
 @pytest.mark.parametrize(("units", "lengths"), [(("km", "km"), True), (("km", "m"), False), (("deg", "deg"), False)])

@@ -49,10 +49,18 @@ def test_flights_of_their_own_steps_are_met_at_common_times_and_count_until_thei
     np.testing.assert_allclose(band.curves[0.5][late], 42.0 * band.at[late], rtol=1e-9)
 
 
-def test_where_too_few_still_fly_the_band_ends():
+def test_where_few_still_fly_median_and_percentiles_end_and_the_extremes_go_on_to_the_last_flight():
+    """A band that ended with the twentieth flight before the last was said to be "smallest to largest" of all."""
     times = [np.linspace(0.0, 10.0 if case < 5 else 4.0, 50) for case in range(40)]
-    band = history_envelopes(histories(np.ones(40), times), range(40), ["x_m"])["x_m"]
-    assert 3.9 < band.at[-1] <= 4.0
+    slopes = np.where(np.arange(40) == 0, 2.0, 1.0)
+    band = history_envelopes(histories(slopes, times), range(40), ["x_m"])["x_m"]
+    assert band.at[-1] == 10.0
+    late = band.at > 4.01
+    np.testing.assert_allclose(band.curves[1.0][late], 2.0 * band.at[late])
+    np.testing.assert_allclose(band.curves[0.0][late], band.at[late])
+    for probability in set(band.curves) - {0.0, 1.0}:
+        assert np.isnan(band.curves[probability][late]).all()
+        assert np.isfinite(band.curves[probability][band.at < 4.0]).all()
 
 
 def test_a_handful_of_cases_makes_no_band():
