@@ -232,6 +232,8 @@ def judge_counted(
 def _joined(joint: Verdict, tests: Sequence[Verdict]) -> Verdict:
     """The verdict on the joint share with the outcome of all tests together."""
     failing = tuple(test.name for test in tests if test.shared_outcome == FAIL)
+    demonstrated = all(test.shared_outcome == PASS for test in tests)
+    joint = replace(joint, shared_outcome=FAIL if failing else PASS if demonstrated else NOT_DEMONSTRABLE)
     if failing:
         return replace(joint, outcome=FAIL, needed=None, failing=() if joint.outcome == FAIL else failing)
     if all(test.outcome == PASS for test in tests):

@@ -26,6 +26,8 @@ NEGLIGIBLE = 1e-7  # of the size of a metric
 ROUNDING = 1e-13  # of numbers of which another one is the difference
 SQUARABLE = 1e140  # largest number, and inverse of the smallest spread, whose squares over all cases can be summed
 NEGLIGIBLE_SPREAD = "standard deviation below a ten-millionth of the value"
+ZERO = 1e-20  # of the largest numbers in the same unit: what is below it is a zero but for rounding
+ROUNDED_ZERO = "zero but for rounding"
 UNSQUARABLE = "numbers beyond 1e140 or a standard deviation below 1e-140"
 
 
@@ -252,14 +254,18 @@ class Flown:
         None where one of them is not known, or is but the rounding of larger metrics in its unit: the crossrange of a
         planar flight beside its range.
         """
-        own, summaries = self.own, self.own.summaries
         known = {} if self.integration is None else self.integration.changes
-        change, summary = known.get(metric), summaries.get(metric)
+        change, summary = known.get(metric), self.own.summaries.get(metric)
         if change is None or summary is None or not summary.spread:
             return None
-        alike = [other for name, other in summaries.items() if own.unit(name) == own.unit(metric)]
-        largest = max(abs(end) for other in alike for end in (other.minimum, other.maximum) if end is not None)
-        return change / summary.spread if summary.spread > ROUNDING * largest else None
+        return change / summary.spread if summary.spread > ROUNDING * self.own.largest_alike(metric) else None
+
+    def largest_alike(self, metric: str) -> float:
+        """Size of the largest number among the metrics in the unit of this one."""
+        alike = [other for name, other in self.summaries.items() if self.unit(name) == self.unit(metric)]
+        return max(
+            (abs(end) for other in alike for end in (other.minimum, other.maximum) if end is not None), default=0.0
+        )
 
     @cached_property
     def key_metrics(self) -> list[str]:
@@ -294,7 +300,7 @@ class Flown:
         """Why no figure shows the spread of a column, in words: it is negligible, or not to be squared; else empty.
 
         Negligible: no limit on it, and σ below a ten-millionth of its size, mostly the tolerance of an event or of the
-        integration.
+        integration; or it is zero but for rounding, as the crossrange of a planar flight beside its range.
         """
         summary = self.summaries.get(name) or summarize(self.values(name), probabilities=())
         if summary.constant or summary.sd is None:
@@ -302,7 +308,11 @@ class Flown:
         size = max(abs(summary.minimum or 0.0), abs(summary.maximum or 0.0))
         if size > SQUARABLE or not summary.sd >= 1.0 / SQUARABLE:
             return UNSQUARABLE
-        return NEGLIGIBLE_SPREAD if self.limits(name) == Limits() and summary.sd < NEGLIGIBLE * size else ""
+        if self.limits(name) != Limits():
+            return ""
+        if name in self.summaries and self.unit(name) and size < ZERO * self.largest_alike(name):
+            return ROUNDED_ZERO
+        return NEGLIGIBLE_SPREAD if summary.sd < NEGLIGIBLE * size else ""
 
     def unsquarable(self, *names: str) -> str:
         """The columns among these that have such numbers that nothing can be computed of their squares; else empty."""

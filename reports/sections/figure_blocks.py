@@ -18,7 +18,7 @@ from reports.figures.distributions import histogram, histograms
 from reports.figures.histories import Envelope, HistoryLine, history_figure, history_plot, phase_limits
 from reports.run.cloud_regions import cloud_regions
 from reports.run.default_figures import history_figures, scatter_figures
-from reports.run.flown import NEGLIGIBLE_SPREAD, UNSQUARABLE, Flown
+from reports.run.flown import NEGLIGIBLE_SPREAD, ROUNDED_ZERO, UNSQUARABLE, ZERO, Flown
 from reports.run.history_bands import FEWEST_CASES, OUTER, fair_cases, history_envelopes, outer_percentile
 from reports.run.history_limits import history_limits
 from reports.run.outcomes import case_outcomes, outcome_names
@@ -131,7 +131,7 @@ def distribution_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
         "the same in all cases that have it": [name for name, item in found if item.constant],
         **{
             why: [name for name, item in found if item.n_used >= FEWEST_VALUES and flown.undrawn(name) == why]
-            for why in (NEGLIGIBLE_SPREAD, UNSQUARABLE)
+            for why in (NEGLIGIBLE_SPREAD, ROUNDED_ZERO, UNSQUARABLE)
         },
         "no case has a number": [name for name, item in found if item.n_used == 0],
     }
@@ -209,7 +209,8 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     silent = [name for name in asked if name in saved and not np.isfinite(flown.histories[name].to_numpy()).any()]
     known = [name for name in asked if name in saved and name not in silent]
     constant = [name for name in known if is_constant(flown.histories[name].to_numpy())]
-    drawn = [name for name in known if name not in constant]
+    rounded = [name for name in _rounded_zeros(flown, known) if name not in constant]
+    drawn = [name for name in known if name not in (*constant, *rounded)]
     histories = saved_histories(flown, drawn)
     yield from _envelope_words(flown, histories.envelopes)
     for figure in wanted:
@@ -218,10 +219,21 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
             yield FigureBlock(figure.title, history_figure(plots), "half")
     if constant:
         yield f"Not drawn, the same in all saved cases at all times: {flown.listed(constant)}."
+    if rounded:
+        yield f"Not drawn, {ROUNDED_ZERO} in all saved cases: {flown.listed(rounded)}."
     if silent:
         yield f"Not drawn, no saved case has a number: {flown.listed(silent)}."
     if missing:
         yield f"Not drawn, the histories have no such output: {', '.join(missing)}."
+
+
+def _rounded_zeros(flown: Flown, names: list[str]) -> list[str]:
+    """Those of these quantities that are nothing beside the largest one in their unit."""
+    sizes = {name: float(np.nanmax(np.abs(flown.histories[name].to_numpy(dtype=np.float64)))) for name in names}
+    largest: dict[str, float] = {}
+    for name, size in sizes.items():
+        largest[flown.unit(name)] = max(size, largest.get(flown.unit(name), 0.0))
+    return [name for name in names if flown.unit(name) and sizes[name] < ZERO * largest[flown.unit(name)]]
 
 
 @dataclass(frozen=True)

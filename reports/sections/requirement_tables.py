@@ -158,7 +158,8 @@ def risk_table(flown: Flown) -> Table | None:
     )
     rows = tuple(_risk_row(verdict, len(judged)) for verdict in judged)
     of = "of the one case" if flown.n_tried == 1 else f"of these {count(flown.n_tried)} cases"
-    note = f"Allowed outside: the most {of} with which the requirement still passes. "
+    note = f"Allowed outside: the most {of} with which the requirement still passes"
+    note += "; all at once, if every requirement passes. " if flown.joint is not None else ". "
     if flown.looked:
         note += (
             "The number of cases was not fixed in advance: the consumer’s risk is then below the figure given, "

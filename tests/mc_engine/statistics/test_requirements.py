@@ -217,6 +217,9 @@ def test_requirements_that_pass_alone_can_fail_together():
 def test_a_shared_confidence_asks_more_of_each():
     alone = both([0.5] * 1000, [6.0] * 1000)[0][0]
     assert (alone.outcome, alone.shared_outcome) == ("pass", "not demonstrable")  # 852 at 90 %, 1259 at 96.67 %
+    verdicts, joint = both([0.5] * 900, [6.0] * 900)
+    assert joint.lower > joint.share
+    assert (joint.outcome, joint.shared_outcome) == ("not demonstrable", "not demonstrable")  # speed is not shown
     verdicts, joint = both([0.5] * 500, [6.0] * 500)
     assert joint.needed == verdicts[1].needed > verdicts[0].needed == 1104  # speed, with 95 %, takes the most
     enough = both([0.5] * 1259, [6.0] * 1259)[0][0]

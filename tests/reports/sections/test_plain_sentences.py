@@ -48,6 +48,21 @@ def test_a_spread_below_a_ten_millionth_of_the_value_is_named_and_not_drawn():
     assert any(row[0].text == "entry speed [m/s]" and row[4].value > 0.0 for row in rows)  # told all the same
 
 
+def test_a_zero_but_for_rounding_is_no_key_result_and_not_drawn():
+    """The crossrange of a planar flight: its 1e-28 km were a card on the first page, a scatter plot and a history."""
+    run = synthetic_run(400, failed=0)
+    names = ("downrange_km", "crossrange_km")
+    for name, size in zip(names, (1.0, 1e-30), strict=True):
+        run.table[name], run.history[name] = size * run.table["max_position_error_m"], size * run.history["force_n"]
+        run.manifest["columns"].append({"name": name, "unit": "km", "role": "metric", "description": ""})
+    run.manifest["figures"] = [to_record(ScatterFigure(*names, "End")), to_record(HistoryFigure(names, "Way"))]
+    document = build(run, "run")
+    assert Flown(run, "run").key_metrics[-1] == "downrange_km"
+    assert "crossrange [km]" not in drawn_labels(document)
+    for said in (": crossrange.", " in all saved cases: crossrange."):
+        assert f"Not drawn, zero but for rounding{said}" in sentences(document)
+
+
 @pytest.mark.parametrize("run", [narrow(0.1), narrow(1e-4, 7800.001)])
 def test_a_larger_spread_and_one_that_a_limit_is_on_are_drawn(run):
     assert "entry speed [m/s]" in drawn_labels(build(run, "run"))
