@@ -232,6 +232,8 @@ def wrong_import(error: BaseException) -> str:
         return ""
     file = getattr(module, "__file__", None)  # the name of a module beside the model's file is the engine's
     who = Path(file).name if file and is_the_users(Path(file)) else error.name
+    if (who, missing[1]) == ("mc_engine.lanes", "abs"):
+        return 'mc_engine.lanes has no "abs"; physics takes that of Python, without an import'
     return f'{who} has no "{missing[1]}"{hint(missing[1], getattr(module, "__all__", [*vars(module)]))}'
 
 

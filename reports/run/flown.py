@@ -1,5 +1,6 @@
 """The run as the report sees it: the table, the nominal, what every column is, and which metrics matter."""
 
+import re
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -359,6 +360,7 @@ class Flown:
         return contributions_of(self)
 
     def status_text(self, status: str) -> str:
-        """The sentence behind a status word: the run's own, or this engine's."""
+        """The sentence behind a status word: the run's own, or this engine's; what is code there stands in quotes."""
         texts = {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()}
-        return str({**texts, **self.manifest.get("status_texts", {})}.get(status, ""))
+        text = str({**texts, **self.manifest.get("status_texts", {})}.get(status, ""))
+        return re.sub("`([^`]*)`", r"“\1”", text)

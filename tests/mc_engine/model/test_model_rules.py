@@ -126,6 +126,7 @@ LINES = [
     (IMPORTS, f"from mc_engine.physics.curves import curve\nTHRUST = curve(between='linear')\n{IMPORTS}", "between",
      "curve: got an unexpected keyword argument 'between'; it takes file, x, y, kind, outside, x_unit, y_unit"),
     (IMPORTS, f"from .guidance import k\n{IMPORTS}", "from .guidance", ": an import from a dot"),
+    (IMPORTS, f"from mc_engine.lanes import abs\n{IMPORTS}", "import abs", ' has no "abs"; physics takes that of Py'),
 ]  # fmt: skip
 
 

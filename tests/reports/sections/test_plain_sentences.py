@@ -68,6 +68,10 @@ def test_a_larger_spread_and_one_that_a_limit_is_on_are_drawn(run):
     assert "entry speed [m/s]" in drawn_labels(build(run, "run"))
 
 
+def test_the_meaning_of_a_status_has_no_marks_of_code():
+    assert "the column “reason” says which" in Flown(synthetic_run(20, failed=0), "run").status_text("crashed")
+
+
 def test_what_is_not_drawn_is_named_in_words():
     run = synthetic_run(200, failed=0)
     run.table["max_position_error_m"] = np.nan
