@@ -13,8 +13,8 @@ from reports.text.numbers import SPACE, count, number
 MOST_MARGIN = 1.0  # of the reach of the limits, either way; margins beyond are drawn at the edge
 TONES = {"good": GREEN, "bad": VERMILION, "open": MUTED}
 SPREAD = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)  # probabilities of what is drawn of a level
-SPANS = ((0, 6, MUTED, 1.2, "all cases"), (1, 5, SKY, 7.0, "5 % to 95 %"),
-         (2, 4, BLUE, 11.0, "middle half of the cases"))  # of SPREAD, with colour, width and words  # fmt: skip
+SPANS = ((0, 6, MUTED, 1.2, "all cases", 1), (1, 5, SKY, 7.0, "5 % to 95 %", 20),
+         (2, 4, BLUE, 11.0, "middle half of the cases", 4))  # of SPREAD, with the fewest cases last  # fmt: skip
 FAR_SIGMA = 10.0  # a larger shift would squeeze those of some σ to nothing on a linear axis
 FAR_APART = 30.0  # levels whose medians differ by such a ratio are drawn on a logarithmic axis
 
@@ -131,7 +131,9 @@ def level_panel(label: str, levels: Sequence[str], quantiles: np.ndarray, used: 
     marks: list[Mark] = []
     # Places are numbers, not words: plotly would read a level such as "2" as a number or a date.
     for place, (level, row, cases) in enumerate(zip(levels, quantiles, used, strict=True)):
-        for low, high, colour, width, key in SPANS:
+        for low, high, colour, width, key, fewest in SPANS:
+            if 0 < cases < fewest:
+                continue
             text = f"{level}, {count(cases)} cases: {number(float(row[low]), 4)} to {number(float(row[high]), 4)}"
             marks.append(Line(row[[low, high]], np.full(2, place), colour, width=width, text=text, key=key))
     median = quantiles[:, 3]

@@ -55,6 +55,14 @@ def test_the_figure_holds_the_quantiles_of_each_level():
     assert "<svg" in paper.svg(drawing)
 
 
+def test_few_cases_of_a_level_have_no_percentiles():
+    """A box from 5 % to 95 % of three cases was drawn between them, where no case is."""
+    quantiles = np.sort(np.random.Generator(np.random.Philox(key=6)).normal(size=(3, 7)), axis=1)
+    drawn = [mark.key for mark in level_panel("load", ["a", "b", "c"], quantiles, [3, 19, 20]).marks[:-1]]
+    ends, wide, half = "all cases", "5 % to 95 %", "middle half of the cases"
+    assert drawn == [ends, ends, half, ends, wide, half]
+
+
 @pytest.mark.parametrize(("side", "percent", "end"), [("at_most", 0.9, "Largest"), ("at_least", 0.1, "Smallest")])
 def test_the_outer_percentile_and_the_end_are_those_on_the_side_of_the_limit(side, percent, end):
     limit = {"name": "load", "metric": "peak_load_g", "share": 0.9, "confidence": 0.9, side: 5.0}
