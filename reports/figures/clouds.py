@@ -13,7 +13,8 @@ from reports.text.numbers import count
 OUTCOMES = ((BLUE, "circle"), (VERMILION, "diamond"), (INK, "triangle-up"))  # inside, outside, failed
 LIMIT_SETS = ((BLUE, "circle"), (VERMILION, "x"), (ORANGE, "diamond"), (PURPLE, "square"), (GREEN, "triangle-up"),
               (SKY, "cross"), (MUTED, "star"))  # fmt: skip
-MOST, FEWER = (4.0, 0.5), (7.0, 0.9)  # size and opacity of the largest class, beneath, and of the others, above it
+MOST, FEWER = (4.0, 0.5), (7.0, 0.9)  # size and opacity of the largest class and of the others, above it
+FEW = 50  # cases of a class, which are drawn large
 OUTLINE_COLOURS = {"ellipse": PURPLE, "region": GREEN, "CEP": VERMILION, "target": ORANGE, "limit": INK}
 
 
@@ -52,12 +53,12 @@ def case_scatter(
     cloud : all of them, with their numbers and columns.
     classes : words of each, and how many cases belong to it, those not shown among them.
     rings : around single points, as the nominal case.  lengths : whether both axes are lengths in one unit.
-    fewer : size and opacity of the points of all classes but the largest.
+    fewer : size and opacity of the points of all classes but the largest, which has them if it has few cases.
     """
     clouds: list[Mark] = []
     for k in sorted((k for k, (_, cases) in enumerate(classes) if cases), key=lambda k: -classes[k][1]):
         (words, cases), rows, (colour, sign) = classes[k], member == k, styles[k]
-        size, opacity = fewer if clouds else MOST
+        size, opacity = fewer if clouds or cases <= FEW else MOST
         shown = int(rows.sum())
         thinned = "" if shown == cases else f" ({count(shown)} shown)"
         numbers = None if cloud.cases is None else cloud.cases[rows]

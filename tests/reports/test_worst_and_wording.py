@@ -17,6 +17,7 @@ from reports.contents import build
 from reports.document.blocks import FigureBlock, Table, blocks_of
 from reports.drawing import screen
 from reports.drawing.marks import Line, Points
+from reports.figures.clouds import FEWER
 from reports.sections.figure_blocks import FEWEST_SHOWN
 from reports.text.numbers import column_texts
 
@@ -119,6 +120,12 @@ def test_both_outcomes_are_drawn_in_proportion_and_the_larger_one_beneath(share)
     assert clouds[0].name.startswith("inside") == (n[0] >= n[1])
     beneath, above = screen.specifications(drawing)[0]["data"][:2]
     assert beneath["marker"]["opacity"] < above["marker"]["opacity"]
+
+
+def test_few_cases_are_drawn_large_enough_to_be_seen():
+    drawing = scatter(synthetic_run(20, failed=0)).drawing
+    clouds = [mark for mark in marks_of(drawing, Points) if mark.cases is not None]
+    assert {(cloud.size, cloud.opacity) for cloud in clouds} == {FEWER}
 
 
 def test_a_normal_ellipse_that_leaves_the_physical_range_is_left_out():
