@@ -87,6 +87,14 @@ def test_every_figure_has_an_alternative_text(page):
     assert all(len(attributes["aria-label"]) > 40 for attributes in images)
 
 
+def test_a_long_name_may_break_so_that_it_pushes_no_verdict_off_the_page():
+    name = "apoapsis_within_the_capability_of_the_orbit_trim_manoeuvres"
+    fuel = {"name": name, "metric": "propellant_kg", "at_most": 2.5, "at_least": None, "share": 0.9, "confidence": 0.9}
+    text = render_html(build(synthetic_run(200, failed=0, requirements=[fuel]), "run")).decode()
+    cells = re.findall(r'<td class="text[^>]*>([^<]*_.*?)</td>|<span class="label">([^<]*_.*?)</span>', text)
+    assert {"".join(found).partition("<small>")[0] for found in cells} == {name.replace("_", "_<wbr>")}
+
+
 def test_the_page_is_the_same_twice(page):
     assert page == render_html(build(synthetic_run(), "run")).decode()
 
