@@ -153,7 +153,7 @@ def environment() -> dict[str, Any]:
         "packages": {name: metadata.version(name) for name in PACKAGES},
         "numba": metadata.version("numba"),
         "llvm": ".".join(map(str, llvm.llvm_version_info)),
-        "git": git_state(Path(__file__).parent),
+        "git": git_state(Path(__file__).parents[1]),
         "seed_contract": SEED_CONTRACT,
     }
 

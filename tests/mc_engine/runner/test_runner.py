@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import mc_engine
 from mc_engine import load_campaign, open_store
 from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.search import SHIPPED
@@ -184,6 +185,12 @@ def test_the_sources_that_draw_inputs_are_in_the_digest_of_sampling(tmp_path, mo
     assert manifest.sampling_digest() == before
     (tmp_path / folder / "__init__.py").write_text("# changed")
     assert manifest.sampling_digest() != before
+
+
+def test_the_git_state_of_a_run_is_that_of_the_whole_engine(monkeypatch):
+    """It was that of the folder `runner`, which an uncommitted change of the integrators left without a mark."""
+    monkeypatch.setattr(manifest, "git_state", lambda folder: folder)
+    assert manifest.environment()["git"] == Path(mc_engine.__file__).parent
 
 
 def test_histories_hold_the_nominal_and_the_first_cases(flown):
