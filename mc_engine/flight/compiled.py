@@ -61,6 +61,7 @@ class CompiledFlyer(Flyer):
         return breaches(self._campaign)
 
     def faults_in_flight(self, process: Process) -> list[str]:
+        make_kernel_folder()  # or what is wrong with the folder would be told as a fault of the model
         return flight_faults(self._campaign, process)
 
     def refuse_faults(self) -> None:

@@ -5,6 +5,7 @@ Every kernel has a small source file of its own, in a folder named by the digest
 wherever they lie.
 """
 
+import errno
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -17,7 +18,7 @@ import numpy as np
 from llvmlite import binding
 
 from mc_engine.cache_folder import cache_folder
-from mc_engine.errors import DiskError, ModelError
+from mc_engine.errors import DiskError, ModelError, UsageError
 from mc_engine.flight.kernel_parts import Functions, parts_of, second_order_of, tracking_of
 from mc_engine.lanes.kernel_cache import Form, Kernel, replace_file
 from mc_engine.lanes.kernel_key import Recorder, kernel_key
@@ -208,13 +209,17 @@ def _write_source(path: Path, text: bytes) -> None:
 
 
 def make_kernel_folder(path: Path | None = None) -> None:
-    """Make the folder of a kernel, by default that of all kernels; DiskError with its variable where none can be."""
+    """Make the folder of a kernel, by default that of all kernels.
+
+    Where none can be made, a full disk is a DiskError, as in a run; any other cause is a UsageError.
+    """
     path = path or cache_folder() / "kernels"
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise DiskError(f"{path}: {error.strerror or error}; compiled kernels are kept there, name another folder in "
-                        "MC_ENGINE_CACHE") from error  # fmt: skip
+        kind = DiskError if error.errno in (errno.ENOSPC, errno.EDQUOT) else UsageError
+        raise kind(f"{path}: {error.strerror or error}; compiled kernels are kept there, name another folder in "
+                   "MC_ENGINE_CACHE") from error  # fmt: skip
 
 
 # ---- what a kernel takes beside the cases
