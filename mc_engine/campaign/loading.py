@@ -42,6 +42,7 @@ from mc_engine.sampling.designs import BY_LEVELS, DESIGNS, IN_BLOCKS, RANDOM, le
 from mc_engine.sampling.distributions import Scalar
 from mc_engine.section import ReportSection
 from mc_engine.status import MOST_CASES
+from mc_engine.store.run_files import path_of
 from mc_engine.suggestions import hint
 
 if TYPE_CHECKING:
@@ -148,12 +149,15 @@ def load_campaign(
         name, source, directory = campaign_name(path), path.name, path.resolve().parent
         text = campaign_text(path)
     else:
-        name, source, directory = str(reference), Path(str(reference)).name, Path(directory or Path.cwd())
+        if not isinstance(text, str):
+            raise EngineError(f"text: {type(text).__name__} is no text; give the contents of the file as a str")
+        name, source = str(reference), Path(str(reference)).name
+        directory = path_of(directory or Path.cwd(), "directory: {} is no path")
     document = parse_toml(text, source)
     written = _campaign_keys(document)
     given = {key: value for key, value in (("cases", cases), ("seed", seed)) if value is not None}
     written.update({key: int(value) if isinstance(value, np.integer) else value for key, value in given.items()})
-    findings, run = Findings(), None if upstream is None else Path(upstream)
+    findings, run = Findings(), None if upstream is None else path_of(upstream, "upstream: {} is no path")
     campaign = _assemble(name, text, directory, document, cases is not None, run, findings)
     if campaign is None or findings.problems:
         raise CampaignError(source, findings.problems)

@@ -1,6 +1,7 @@
 """Points of curves and surfaces: read from a CSV or Parquet file, in SI by the units in the names of its columns, held
 to what a curve needs, and made into what a look-up reads: a row of numbers for each point, or each cell of a grid."""
 
+import os
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -42,7 +43,7 @@ def si_factor(name: str, unit: str | None = None) -> float:
     """
     if unit is not None:
         if unit not in UNITS:
-            raise ModelError(f'"{unit}" is not a unit{unit_hint(unit)}')
+            raise ModelError(f'"{unit}" is not a unit{unit_hint(str(unit))}')
         return UNITS[unit].factor
     if name.isalnum():  # mach, cd
         return 1.0
@@ -92,10 +93,16 @@ def _parquet(path: Path) -> dict[str, np.ndarray]:
 _NUMBERS = {"double", "float", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))}
 
 
-def caller_folder() -> Path:
-    """Folder of the module that calls the function that calls this one."""
-    file = sys._getframe(2).f_globals.get("__file__")
-    return Path(file).parent if file else Path.cwd()
+def path_beside_caller(file: object) -> Path:
+    """Path of a file that is named from the folder of the module that calls the function that calls this one.
+
+    ModelError for what is no name, such as points without the names of their arguments.
+    """
+    if not isinstance(file, str | os.PathLike):
+        what = type(file).__name__
+        raise ModelError(f"the first argument is the name of a file, and {what} is none; give points as x=..., y=...")
+    caller = sys._getframe(2).f_globals.get("__file__")
+    return (Path(caller).parent if caller else Path.cwd()) / file
 
 
 def array_of(values: Any, name: str, unit: str | None = None, dimensions: int = 1) -> np.ndarray:

@@ -23,7 +23,6 @@ from mc_engine.lanes.number import Number, result_of
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.physics.curve_points import (
     array_of,
-    caller_folder,
     columns_of,
     cubic_cells,
     cubic_rows,
@@ -33,6 +32,7 @@ from mc_engine.physics.curve_points import (
     linear_rows,
     nearest_cells,
     nearest_rows,
+    path_beside_caller,
     refuse_points,
     turnovers,
 )
@@ -92,7 +92,7 @@ def curve(
     """
     _refuse_unknown(kind, KINDS, "kind")
     _refuse_unknown(outside, OUTSIDE, "outside")
-    path = caller_folder() / file if file is not None else None
+    path = path_beside_caller(file) if file is not None else None
     if path is not None:
         read = columns_of(path, {str(x): x_unit, str(y): y_unit})
         xs, ys = read[str(x)], read[str(y)]
@@ -122,7 +122,7 @@ def wind_profile(
     components, or speed and coming_from, the direction that the wind blows from, clockwise from north.  Components are
     what is interpolated, so that 350 and 10 degrees have north between them, with a speed a little below both.
     """
-    path = caller_folder() / file
+    path = path_beside_caller(file)
     wanted = [name for name in (altitude, north, east, speed, coming_from) if name]
     if len(wanted) != 3 or bool(north) != bool(east):
         raise ModelError("a wind has the columns north and east, or speed and coming_from")
@@ -158,8 +158,8 @@ def surface(
     """
     _refuse_unknown(kind, KINDS, "kind")
     _refuse_unknown(outside, OUTSIDE, "outside")
+    path = path_beside_caller(file) if file is not None else None
     words = f"the surface {file or ''}".rstrip()
-    path = caller_folder() / file if file is not None else None
     given = units or {}
     for name in given.keys() - ({str(x), str(y), str(z)} if path is not None else {"x", "y", "z"}):
         raise ModelError(f'{words}: units has "{name}", which is none of its numbers')

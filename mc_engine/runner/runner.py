@@ -29,7 +29,7 @@ from mc_engine.runner.shards import Shard, merge_shards
 from mc_engine.sampling.designs import block_problem, extension_problem
 from mc_engine.store.opening import open_store
 from mc_engine.store.repair import mend_journal
-from mc_engine.store.run_files import JOURNAL, default_folder
+from mc_engine.store.run_files import JOURNAL, default_folder, path_of
 from mc_engine.store.store import Store, create_store
 from mc_engine.store.urls import is_url
 
@@ -100,7 +100,7 @@ def run(
     refuse_no_campaign(campaign)
     if shard is not None and not isinstance(shard, Shard):
         raise EngineError(f'shard: {shard!r} is no Shard; Shard.parse("1/2") of mc_engine.runner.shards makes one')
-    path = Path(out) if out is not None else default_folder(campaign.name)
+    path = default_folder(campaign.name) if out is None else path_of(out, "out: {} is no path")
     session = session_of(progress, workers, chunk, backend)
     flyer_on(session.backend.name, campaign).refuse_faults()
     refuse_undeclared_data(campaign)

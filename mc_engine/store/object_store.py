@@ -32,7 +32,7 @@ from mc_engine.store.derived_files import derived_files
 from mc_engine.store.journal import Entry, Scan, read_journal, scan
 from mc_engine.store.parts import PART_FOLDERS, is_part_file
 from mc_engine.store.receipts import receipts_of
-from mc_engine.store.run_files import CAMPAIGN, JOURNAL, MANIFEST, SENSITIVITY, is_run_directory
+from mc_engine.store.run_files import CAMPAIGN, JOURNAL, MANIFEST, SENSITIVITY, is_run_directory, path_of
 from mc_engine.store.urls import ON_DISK, is_url, store_url
 from mc_engine.store.writer_lock import LOCK_FILES, WriterLock
 
@@ -183,11 +183,9 @@ def _copy(url: str, folder: Path) -> None:
 
 def local_copy(place: str | Path) -> Path:
     """The directory `place`; for a URL, a copy that is removed when this process ends."""
-    if not isinstance(place, str | os.PathLike):
-        beside = f"; its path is {place.path}" if isinstance(getattr(place, "path", None), Path) else ""
-        raise UsageError(f"a run is opened by its path or URL, and {type(place).__name__} is neither{beside}")
+    path = path_of(place, "a run is opened by its path or URL, and {} is neither")
     if not is_url(place):
-        return Path(place)
+        return path
     scratch = Path(tempfile.mkdtemp(prefix="mc-engine-"))
     atexit.register(shutil.rmtree, scratch, ignore_errors=True)
     return fetch(str(place), scratch / str(place).rstrip("/").rpartition("/")[2])

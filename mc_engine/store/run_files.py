@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from mc_engine.durable_file import temporary_name
+from mc_engine.errors import UsageError
 
 JOURNAL, MANIFEST = "journal.jsonl", "manifest.json"
 CAMPAIGN = "campaign.toml"
@@ -17,6 +18,18 @@ NO_FOLDER = "the folder is gone"
 NO_TEXT = "lies where a name is no text in UTF-8; rename the folder or file"
 RUN, TUNING, RARE_EVENT = "run", "tuning", "rare event"
 STEMS = {TUNING: "tuning", RARE_EVENT: "rare"}
+
+
+def path_of(place: object, refusal: str) -> Path:
+    """The path that a caller in Python gave; UsageError for what is none.
+
+    refusal : the sentence, with {} for the type of what was given
+    """
+    if isinstance(place, str | os.PathLike):
+        return Path(place)
+    own = getattr(place, "path", None)
+    beside = f"; its path is {own}" if isinstance(own, Path) else ""
+    raise UsageError(f"{refusal.format(type(place).__name__)}{beside}")
 
 
 def kind_of(path: str | Path) -> str | None:

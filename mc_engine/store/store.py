@@ -29,7 +29,16 @@ from mc_engine.store.journal import PUT_BACK, Entry, Journal, damaged_line, enco
 from mc_engine.store.manifest_file import cases_in, columns_in, edited_files, manifest_bytes, parse_manifest
 from mc_engine.store.parts import CASE_COLUMNS, PART_FOLDERS, Column, Part, Written, is_part_file
 from mc_engine.store.receipts import Range, receipts_of
-from mc_engine.store.run_files import CAMPAIGN, CUT_SHORT, JOURNAL, MANIFEST, NO_FOLDER, NOMINAL, is_run_directory
+from mc_engine.store.run_files import (
+    CAMPAIGN,
+    CUT_SHORT,
+    JOURNAL,
+    MANIFEST,
+    NO_FOLDER,
+    NOMINAL,
+    is_run_directory,
+    path_of,
+)
 from mc_engine.store.writer_lock import LOCK_FILES, LOCK_NAME, WriterLock, writer_of_new
 
 if TYPE_CHECKING:
@@ -104,7 +113,7 @@ class Store:
     """
 
     def __init__(self, path: str | Path):
-        self.path = path = Path(path)
+        self.path = path = path_of(path, "a run is opened by its path, and {} is none")
         if not is_run_directory(path):
             raise StoreError(f"{path}: is no run directory" if path.exists() else f"{path}: there is no such folder")
         self._lock = WriterLock(path)
@@ -235,6 +244,8 @@ class Store:
 
     def row(self, case_id: int) -> dict[str, Any]:
         """The row of one case, by column name; StoreError if the case is not committed."""
+        if not isinstance(case_id, int | np.integer):
+            raise StoreError(f"{self.path}: case {case_id!r} is not there; cases are whole numbers, from 0 on")
         for part in self.parts:
             if part.first <= case_id < part.stop:
                 return parts.read_part(self.path, part, self.columns).slice(case_id - part.first, 1).to_pylist()[0]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from mc_engine.numbers_in_text import decimals_of, outward, percent_digits
 from mc_engine.store.result_folder import read_result
-from mc_engine.store.run_files import RARE_EVENT
+from mc_engine.store.run_files import RARE_EVENT, path_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,8 +39,9 @@ class RareEventRecord:
 
 def open_rare_event(path: str | Path) -> RareEventRecord:
     """The estimate in directory `path`; StoreError if there is none, or a byte of it changed."""
-    record, tables = read_result(Path(path), RARE_EVENT)
-    return RareEventRecord(Path(path), record, tables["cases"])
+    path = path_of(path, "a rare event is opened by its path, and {} is none")
+    record, tables = read_result(path, RARE_EVENT)
+    return RareEventRecord(path, record, tables["cases"])
 
 
 def rare_event_lines(result: dict[str, Any]) -> Iterator[str]:

@@ -21,7 +21,7 @@ from mc_engine.runner.runner import ProgressCall
 from mc_engine.section import Section
 from mc_engine.store.parts import Column
 from mc_engine.store.result_folder import ColumnsAndArrays, write_result
-from mc_engine.store.run_files import TUNING, default_folder
+from mc_engine.store.run_files import TUNING, default_folder, path_of
 from mc_engine.store.store import refuse_occupied
 from mc_engine.store.writer_lock import WriterLock, writer_of_new
 from mc_engine.studies.candidates import Scores, cases_per_candidate, fly_candidates
@@ -83,7 +83,7 @@ def tune(
             "[tuning.objective.NAME], as flexible_satellite/stage_1 does"
         )
         raise CampaignError(campaign.name, [Problem("tuning", message)])
-    path = Path(out) if out is not None else default_folder(campaign.name)
+    path = default_folder(campaign.name) if out is None else path_of(out, "out: {} is no path")
     plan: dict[str, Any] = {
         "seed": (tuning.seed if tuning.seed is not None else campaign.seed % _SEED_RANGE) if seed is None else seed,
         "population": population or tuning.population,

@@ -14,7 +14,7 @@ import numpy as np
 
 from mc_engine.numbers_in_text import counted
 from mc_engine.store.result_folder import read_result
-from mc_engine.store.run_files import TUNING
+from mc_engine.store.run_files import TUNING, path_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,8 +61,9 @@ def open_tuning(path: str | Path) -> TuningRecord:
     >>> open_tuning("runs/tuned").manifest["tuning"]["end"]
     'all generations'
     """
-    manifest, tables = read_result(Path(path), TUNING)
-    return TuningRecord(Path(path), manifest, **tables)
+    path = path_of(path, "a tuning is opened by its path, and {} is none")
+    manifest, tables = read_result(path, TUNING)
+    return TuningRecord(path, manifest, **tables)
 
 
 def tuning_lines(record: TuningRecord) -> list[str]:

@@ -220,6 +220,12 @@ def test_what_is_wrong_with_a_call_is_said(folder):
         curve(x="time_s", y="thrust_n")
     with pytest.raises(ModelError, match="rise"):
         surface(x=[0, 1], y=[1, 0], z=[[0, 0], [0, 0]])
+    for points in (np.arange(2.0), [0.0, 1.0]):
+        for wrong in (lambda p=points: surface(p, p, np.eye(2)), lambda p=points: curve(p, p)):
+            with pytest.raises(ModelError, match=r"first argument is the name of a file, .* give points as x=..., y="):
+                wrong()
+    with pytest.raises(ModelError, match='"3" is not a unit'):
+        curve(x=[0, 1], y=[0, 1], x_unit=3)
     with pytest.raises(FileNotFoundError):
         curve("missing.csv")
 
