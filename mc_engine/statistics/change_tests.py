@@ -53,6 +53,11 @@ class Estimate:
     upper: float
 
     @property
+    def unbounded(self) -> bool:
+        """Whether the cases, or the pairs that differ, are too few for either end of the interval."""
+        return self.lower == -inf and self.upper == inf
+
+    @property
     def decimals(self) -> int:
         """Decimals that show the width of the interval in two digits, or the value in three without a width."""
         width = self.upper - self.lower

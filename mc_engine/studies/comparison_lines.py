@@ -12,6 +12,7 @@ from mc_engine.studies.run_changes import changed_lines
 
 _LEAST_P = 1e-12  # a smaller p-value means no more
 _TIES = "ties"
+_NO_INTERVAL = "no interval"
 _HEADINGS = ("metric", "shift", "in sigma of A", "adjusted p", "spread B/A", "adjusted p", "used A, B")
 
 
@@ -82,6 +83,8 @@ def _metric_table(comparison: Comparison) -> Iterator[str]:
         yield f"in brackets: {sure} % intervals, each by itself; p-values are adjusted for all tests together"
     if any(_TIES in row for row in rows):
         yield f"{_TIES}: so many cases have equal values that the size of a significant change is hidden; see --report"
+    if any(_NO_INTERVAL in cell for row in rows for cell in row):
+        yield f"{_NO_INTERVAL}: the cases, or those that differ between the runs, are too few for one"
     if same:
         yield f"the same in both runs: {', '.join(same)}"
     absent = [metric.metric for metric in comparison.metrics if not metric.same and not finite(metric.shift)]
@@ -113,7 +116,7 @@ def _with_interval(estimate: Estimate) -> str:
     if not np.isfinite(estimate.value):
         return "-"
     value, lower, upper = (f"{round(end, estimate.decimals) + 0.0:.{estimate.decimals}f}" for end in astuple(estimate))
-    return f"{value} [{lower}, {upper}]"
+    return f"{value} [{_NO_INTERVAL if estimate.unbounded else f'{lower}, {upper}'}]"
 
 
 def _p_value_text(value: float, alpha: float) -> str:

@@ -251,7 +251,7 @@ def _metric_table(comparison: Comparison, units: Mapping[str, str], moved: list[
         "Significant changes first, each kind by its size. "
         f"Small: the {given_percent(comparison.confidence)} interval of the quantity that the test "
         "is of; cases used of cases flown. σ: standard deviation of run A. *: significant, for better or worse. "
-        "–: no size, as a run has no spread, or ties hide it."
+        "–: no size, as a run has no spread, or ties hide it. No interval: too few cases, or pairs that differ."
     )
     rows = tuple(_metric_row(comparison, change, units[change.metric]) for change in moved)
     return Table("Metrics of both runs", columns, rows, note)
@@ -294,7 +294,7 @@ def _estimate_cell(estimate: Estimate) -> Cell:
     value, lower, upper = (
         fixed(end, estimate.decimals) if np.isfinite(end) else number(end) for end in astuple(estimate)
     )
-    return Cell(value, estimate.value, f"[{lower}, {upper}]")
+    return Cell(value, estimate.value, "no interval" if estimate.unbounded else f"[{lower}, {upper}]")
 
 
 def _p_value_cell(value: float, alpha: float) -> Cell:

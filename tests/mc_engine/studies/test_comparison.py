@@ -9,6 +9,7 @@ from comparable_runs import COLUMNS, TEXT, run
 from mc_engine.sampling.streams import uniforms
 from mc_engine.studies.comparison import compare_runs, pair_cases
 from mc_engine.studies.comparison_lines import comparison_lines
+from reports.studies.comparison import build_comparison
 from tests.mc_engine.command_line.cart import REQUIREMENT, call
 
 
@@ -131,6 +132,20 @@ def test_a_terminal_shows_no_size_of_a_change_that_ties_hide(tmp_path):
     _, shift, in_sigma, _, star, *_ = row.split()
     assert (shift, in_sigma, star) == ("ties", "ties", "*")
     assert any(line.startswith("ties: ") for line in lines)
+
+
+def test_two_pairs_that_differ_among_many_have_no_interval_and_no_infinite_ends(tmp_path):
+    some = np.arange(1000) % 7.0
+    moved = np.where(np.arange(1000) < 2, some + 1.0, some)
+    found = compared(run(tmp_path / "a", n=1000, pulses=some), run(tmp_path / "b", n=1000, pulses=moved))
+    lines = list(comparison_lines(found))
+    (row,) = [line for line in lines if line.startswith("pulses ")]
+    assert "[no interval]" in row
+    assert any(line.startswith("no interval: ") for line in lines)
+    assert "inf]" not in "".join(lines)
+    shown = str(build_comparison(found))
+    assert "'no interval'" in shown
+    assert "∞]" not in shown
 
 
 def test_what_changed_in_code_and_campaign_is_told(tmp_path):
