@@ -268,7 +268,7 @@ def _naming(next_step: str) -> Iterator[None]:
 
 
 class _Remote:
-    """The objects below a URL.  sizes : their lengths by name, as listed when this object was made."""
+    """The objects below a URL.  sizes : their lengths by name, as listed when this object was made; -1 if not told."""
 
     def __init__(self, url: str):
         from fsspec.core import url_to_fs
@@ -279,10 +279,14 @@ class _Remote:
         self.sizes = self.listed()
 
     def listed(self) -> dict[str, int]:
-        """Lengths by name of the objects at this moment."""
+        """Lengths by name of the objects at this moment; -1 where the store, such as a web server, tells none."""
         self._files.invalidate_cache()
         listed: dict[str, dict[str, Any]] = self._files.find(self._root, detail=True)
-        return {path[len(self._root) :].lstrip("/"): int(facts["size"]) for path, facts in listed.items()}
+        if not listed:
+            with suppress(FileNotFoundError, NotADirectoryError):
+                self._files.ls(self._root)  # an error where the store does not answer, for which `find` lists nothing
+        sizes = {path: facts["size"] for path, facts in listed.items()}
+        return {path[len(self._root) :].lstrip("/"): -1 if size is None else int(size) for path, size in sizes.items()}
 
     def journal(self) -> Scan | None:
         """The journal at the URL, with lines that may be damaged; None if there is none."""

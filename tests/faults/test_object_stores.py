@@ -3,7 +3,10 @@
 import hashlib
 import logging
 import shutil
+import threading
 import time
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 from stones import stones
@@ -67,6 +70,21 @@ def test_a_run_comes_back_from_s3_byte_by_byte(s3, run, tmp_path):
     back = fetch(f"{s3}/study/one", tmp_path / "back")
     assert digests(back) == digests(run)
     assert damage(back) == []
+
+
+def test_a_run_comes_back_from_a_web_server_and_one_that_does_not_answer_is_told(run, tmp_path):
+    pytest.importorskip("aiohttp")
+    handler = partial(SimpleHTTPRequestHandler, directory=tmp_path)
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        url = f"http://127.0.0.1:{server.server_port}/run"
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        assert digests(fetch(url, tmp_path / "back")) == digests(run)
+        with pytest.raises(UsageError, match="nothing: holds no run"):
+            fetch(f"{url}/nothing", tmp_path / "none")
+        server.shutdown()
+    with pytest.raises(StoreError, match="Cannot connect") as told:
+        fetch(url, tmp_path / "none")
+    assert not isinstance(told.value, UsageError)
 
 
 def test_a_run_that_flies_keeps_its_copy_on_s3_and_a_report_on_it_is_written_there(s3, tmp_path):
