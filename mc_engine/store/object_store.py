@@ -276,15 +276,14 @@ class _Remote:
         self.url = store_url(url)
         self._files, root = url_to_fs(self.url, use_listings_cache=False)
         self._root = str(root).rstrip("/")
+        with suppress(FileNotFoundError, NotADirectoryError):
+            self._files.ls(self._root)  # an error where the store does not answer; `find` would list nothing
         self.sizes = self.listed()
 
     def listed(self) -> dict[str, int]:
         """Lengths by name of the objects at this moment; -1 where the store, such as a web server, tells none."""
         self._files.invalidate_cache()
         listed: dict[str, dict[str, Any]] = self._files.find(self._root, detail=True)
-        if not listed:
-            with suppress(FileNotFoundError, NotADirectoryError):
-                self._files.ls(self._root)  # an error where the store does not answer, for which `find` lists nothing
         sizes = {path: facts["size"] for path, facts in listed.items()}
         return {path[len(self._root) :].lstrip("/"): -1 if size is None else int(size) for path, size in sizes.items()}
 
@@ -324,6 +323,8 @@ def _reaching(url: str) -> Iterator[None]:
         raise
     except ImportError as error:
         raise UsageError(f"{url}: needs a package: {error}; {how_to_install('cloud')}") from error
+    except TimeoutError as error:
+        raise StoreError(f"{url}: the store has not answered in time") from error
     except Exception as error:  # each store's package has its own errors
         raise StoreError(f"{url}: {type(error).__name__}: {error}") from error
 
