@@ -64,6 +64,8 @@ class Backend:
             cards()
         if self.name == "dask" and importlib.util.find_spec("distributed") is None:
             raise EngineError(f'the backend "dask" needs the package distributed; {how_to_install("cluster")}')
+        if self.scheduler is not None:
+            _refuse_no_address(self.scheduler)
 
     def options(self) -> str:
         """The options of the command line that select this backend, each with a space before it."""
@@ -78,6 +80,15 @@ class Backend:
             "patience": patience,
         }
         return "".join(f" --{key} {shell_word(str(value))}" for key, value in values.items() if value is not None)
+
+
+def _refuse_no_address(scheduler: str) -> None:
+    from distributed.comm import resolve_address
+
+    try:
+        resolve_address(scheduler)
+    except (OSError, ValueError) as error:  # OSError: a host that is not known
+        raise EngineError(f"--scheduler {scheduler}: {error}; write an address such as tcp://node1:8786") from None
 
 
 def flyer_on(backend: str, campaign: Campaign) -> Flyer:

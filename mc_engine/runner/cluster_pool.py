@@ -141,14 +141,10 @@ class _LocalWorkers:
 def _client(scheduler: Any) -> Iterator[Any]:
     """A client of a scheduler, by its address or its cluster; left without waiting for one that does not answer."""
     from distributed import Client
-    from distributed.comm import resolve_address
 
     try:
-        if isinstance(scheduler, str):
-            # Dask leaves a client of no address half begun; its end, in the thread of a next one, would hold that up.
-            resolve_address(scheduler)
         client = Client(scheduler, timeout=START_S, set_as_default=False)
-    except (OSError, ValueError) as error:  # nobody there, or no address
+    except (OSError, ValueError) as error:  # nobody there
         raise WorkersLost(f"--scheduler {scheduler}: there is no scheduler: {error}") from error
     try:
         yield client

@@ -153,6 +153,12 @@ def test_a_shard_is_no_run_to_extend_or_to_take_inputs_from(campaign, tmp_path):
         (("threading", None, 3.0), "a thread cannot be limited in time or memory"),
         (("cuda", None, 3.0), "a card cannot be limited in time or memory"),
         (("dask", "tcp://node:1", None, 1000), "dask worker --memory-limit"),
+        (
+            ("dask", "localhost"),
+            "--scheduler localhost: missing port number .*; write an address such as tcp://node1:8786",
+        ),
+        (("dask", "foo://node:1"), "unknown address scheme 'foo'"),
+        (("dask", "no such:x"), "--scheduler no such:x: "),
         (("loky", None, None, None, 60.0), 'patience is for the backend "dask", whose workers come and go'),
     ],
 )
@@ -168,11 +174,10 @@ def test_a_grid_without_a_seed_can_be_resumed_and_replayed(tmp_path):
     assert runner.replay(store.path, 7).equal
 
 
-@pytest.mark.parametrize("address", ["no such:x", "tcp://127.0.0.1:1"])
-def test_a_scheduler_that_is_not_there_leaves_a_run_that_can_be_resumed(campaign, tmp_path, monkeypatch, address):
+def test_a_scheduler_that_is_not_there_leaves_a_run_that_can_be_resumed(campaign, tmp_path, monkeypatch):
     monkeypatch.setattr(cluster_pool, "START_S", 0.5)
     with pytest.raises(RunInterrupted, match=r"there is no scheduler: .*`mc-engine resume .*--backend dask"):
-        runner.run(campaign, tmp_path / "run", chunk=CHUNK, backend=Backend("dask", address))
+        runner.run(campaign, tmp_path / "run", chunk=CHUNK, backend=Backend("dask", "tcp://127.0.0.1:1"))
     assert runner.resume(tmp_path / "run").status_counts() == {"ok": CASES}
     # a client left half begun may be closed in the thread of the next one, which then does not start
     assert {one.status for one in gc.get_objects() if type(one) is Client} <= {"closed"}
