@@ -38,7 +38,7 @@ def campaign_of(store: "Store", directory: Path | None = None) -> Campaign:
     if imported := store.manifest.get("imported"):
         why = f"its results were imported from {imported['file']}; the engine did not fly them"
         raise UsageError(f"{store.path}: {why}")
-    store.check_companions()
+    store.check_originals()
     recorded = store.manifest["campaign"]
     model, contract = store.manifest.get("model", {}), store.manifest.get("seed_contract")
     flown_by = model.get("digest"), model.get("sampling_digest"), contract

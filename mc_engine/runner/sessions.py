@@ -106,6 +106,7 @@ def _fly_missing(store: Store, campaign: Campaign, session: Session, repair: boo
         _fly_companion(store, campaign, session, repair, stop)
         if not store.notes("companion"):
             store.note("companion")
+    store.check_originals()  # without them a directory of all cases is no run
     times = {"prepare_s": round(begun - begin, 3), "fly_s": round(flown - begun, 3)}
     store.note("finished", **times, integration=integration_changes(store, campaign))
 

@@ -163,8 +163,10 @@ class Store:
         except UnicodeDecodeError as error:
             raise StoreError(f"{self.path / CAMPAIGN}: is no text: {error}") from None
 
-    def check_companions(self) -> None:
-        """StoreError if a copy of a file that the campaign reads has changed since the run began."""
+    def check_originals(self) -> None:
+        """StoreError if manifest, campaign file or a file that the campaign reads has changed since the run began."""
+        self._original(MANIFEST, "manifest")
+        self._original(CAMPAIGN, "campaign")
         for problem in edited_files(self.path, self._created.get("companions", {})):
             raise StoreError(f"{self.path}/{problem}; {PUT_BACK}")
 

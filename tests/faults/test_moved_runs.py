@@ -5,8 +5,10 @@ import shutil
 import signal
 
 import pytest
+from stones import stones
 from test_signals import begin, end
 
+from mc_engine.errors import StoreError
 from mc_engine.runner import runner
 from mc_engine.store.verification import damage
 
@@ -55,3 +57,12 @@ def test_a_run_whose_directory_is_gone_says_so_and_goes_on_at_its_new_place(tmp_
         assert runner.resume(moved, workers=2).missing() == []
         assert damage(moved) == []
         assert [path.name for path in tmp_path.glob("run/**/*")] == []  # nothing came back at the old place
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "campaign.toml"])
+def test_a_run_that_lost_what_says_what_it_is_does_not_end_as_complete(tmp_path, name):
+    def remove_once(*_):
+        (tmp_path / "run" / name).unlink(missing_ok=True)
+
+    with pytest.raises(StoreError, match=rf"{name}: is gone; put the original back"):
+        runner.run(stones(tmp_path, 40), tmp_path / "run", progress=remove_once)
