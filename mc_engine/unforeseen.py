@@ -68,9 +68,11 @@ def _tell_error(error: BaseException | None) -> None:
 
 
 def refuse_small_memory() -> None:
-    """End the process if `ulimit -v` leaves less memory than loading takes; if it is small, limit BLAS to one thread.
+    """End the process if `ulimit -v` leaves less memory than loading takes.
 
-    A BLAS without memory for its threads never returns, or ends the process with the exit status 1.
+    If it is small, BLAS is limited to one thread, and Arrow takes its memory from the system's allocator: a BLAS
+    without memory for its threads never returns, or ends the process with the exit status 1, and Arrow's own allocator
+    ends it with a segmentation fault.
     """
     with suppress(ImportError, ValueError, OSError):
         import resource
@@ -85,3 +87,4 @@ def refuse_small_memory() -> None:
         if 0 <= soft < _SMALL:
             for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
                 os.environ.setdefault(name, "1")
+            os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
