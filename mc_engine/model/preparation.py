@@ -80,7 +80,8 @@ def _refuse_unfit(parameter: Parameter, column: np.ndarray, refusals: Refusals) 
     refusals.add(np.isnan(column), f"{parameter.name} is not a number")
     refusals.add(np.isinf(column), f"{parameter.name} is infinite")
     outside = ~((column >= parameter.low) & (column <= parameter.high))
-    refusals.add(outside, f"{parameter.name} is outside {parameter.low:g} to {parameter.high:g} {parameter.unit}")
+    bounds = f"{parameter.low:g} to {parameter.high:g} {parameter.unit}".rstrip()
+    refusals.add(outside, f"{parameter.name} is outside {bounds}")
 
 
 def _parameter_row(model: Model, columns: Mapping[str, Any], name: str, n_cases: int) -> np.ndarray:

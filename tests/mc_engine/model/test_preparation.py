@@ -75,6 +75,14 @@ def test_one_number_counts_for_all_cases_and_an_array_has_one_for_each(tmp_path)
     assert np.diff(burn).tolist() == [1.0] * 4
 
 
+def test_a_number_outside_of_the_bounds_of_an_input_is_told_with_its_unit_if_it_has_one(tmp_path):
+    inputs = 'gain=Parameter(1.0, "a gain", 0.0, 2.0, unit=""), range_km=Parameter(1.0, "a range", 0.0, 2.0)'
+    lost = campaign_with(tmp_path, *with_input(inputs))
+    for name, words in [("gain", "gain is outside 0 to 2"), ("range_km", "range_km is outside 0 to 2 km")]:
+        given = {**lost.nominal, name: np.array([1.0, 3.0])}
+        assert prepare(lost.model, given, 2).refusals.reason.tolist() == ["", words]
+
+
 def test_an_error_of_the_models_own_stays_what_it_is(tmp_path):
     with pytest.raises(EngineError, match=r"model\.py, line \d+: `prepare`: KeyError: 7"):
         campaign(tmp_path, "{}[7]")
