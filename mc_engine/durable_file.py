@@ -42,11 +42,12 @@ _HOLDS_FOLDERS = os.open in os.supports_dir_fd and hasattr(os, "O_NOFOLLOW")  # 
 def disk_errors(path: Path) -> Iterator[None]:
     """Turn an OSError of the block into a DiskError whose text begins with `path`.
 
-    If the file is missing or is a symbolic link, it becomes a StoreError, since the disk is not the cause.
+    If the file is missing or is a symbolic link, or a folder on the way to it is no folder, it becomes a StoreError,
+    since the disk is not the cause.
     """
     try:
         yield
-    except FileNotFoundError as error:
+    except (FileNotFoundError, NotADirectoryError) as error:
         raise StoreError(f"{path}: {error.strerror or error}") from error
     except OSError as error:
         if error.errno == errno.ELOOP:

@@ -94,7 +94,7 @@ def refuse_occupied(path: Path, companions: Iterable[str] = ()) -> None:
         raise StoreError(f"{path}: holds a run already; `resume` or `extend` it, or choose another folder")
     cut_short = LOCK_NAME in names and all(name in expected or disk.is_temporary(name) for name in names)
     if names and not cut_short:
-        raise StoreError(f"{path}: is not empty and holds no run; choose another folder")
+        raise StoreError(f"{path}: is not empty and holds no run; empty it, or choose another folder")
 
 
 class Store:

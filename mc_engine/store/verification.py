@@ -146,11 +146,14 @@ def _run_damages(run: Path) -> tuple[list[Damage], Collection[str]]:
 def _companion_problems(run: Path, journal: Scan) -> Iterator[Damage]:
     """Damage of the flights for sensitivities, which are a run directory inside the run."""
     flown = any(entry.event == "companion" for entry in journal.entries)
-    if flown and not _is_folder(run / SENSITIVITY):
-        yield Damage(f"{SENSITIVITY}: {NO_FOLDER}", REPAIR)
-    elif _is_folder(run / SENSITIVITY):
-        for item in damages(run / SENSITIVITY) if kind_of(run / SENSITIVITY) == RUN else ():
+    folder = run / SENSITIVITY
+    if _is_folder(folder) and kind_of(folder) == RUN:
+        for item in damages(folder):
             yield Damage(f"{SENSITIVITY}/{item.what}", item.mended_by)
+    elif flown and os.path.lexists(folder):
+        yield Damage(f"{SENSITIVITY}: is no folder with a run", IN_THE_WAY)
+    elif flown:
+        yield Damage(f"{SENSITIVITY}: {NO_FOLDER}", REPAIR)
 
 
 def _begun_with(journal: Scan) -> dict[str, str]:

@@ -143,6 +143,18 @@ def test_a_damaged_line_about_the_flights_beside_a_run_is_repaired_with_the_run(
     assert open_store(whole).cases().equals(table)
 
 
+@pytest.mark.parametrize("file", ["", "thesis.txt"], ids=["a file", "a folder with a file"])
+def test_what_took_the_place_of_the_flights_beside_a_run_is_damage_and_no_interruption(tmp_path, file):
+    run = tmp_path / "run"
+    place = runner.run(campaign(tmp_path, "[sensitivity]\ncases = 32\n"), run, workers=1).path / "sensitivity"
+    shutil.rmtree(place)
+    (place / file).parent.mkdir(exist_ok=True)
+    (place / file).touch()
+    assert damage(run) == ["sensitivity: is no folder with a run"]
+    with pytest.raises(StoreError, match=r"sensitivity: (Not a directory|is not empty and holds no run; empty it)"):
+        runner.resume(run)  # `resume` of a run that was interrupted would say so without end
+
+
 def test_inputs_that_are_correlated_are_one_group(tmp_path):
     pairs = "".join(f"[[correlation]]\nbetween = ['{a}', '{b}']\nrank = 0.5\n" for a, b in (("x1", "x3"), ("x4", "x1")))
     groups = campaign(tmp_path, pairs + "[sensitivity]\ncases = 64\n").sensitivity.groups
