@@ -5,6 +5,15 @@ import sys
 from importlib import import_module
 
 
+def _refuse_lost_folder() -> None:
+    """End the process where the working folder was removed: what is imported or started then fails in its own way."""
+    try:
+        os.getcwd()
+    except OSError as error:
+        print(f"the working folder: {error.strerror}; change to another folder first", file=sys.stderr)
+        sys.exit(2)  # wrong usage
+
+
 def _forget_working_folder() -> None:
     """Remove the working folder, which `python -m` puts first, from the import path, unless the engine is in it.
 
@@ -22,6 +31,7 @@ def main() -> None:
     from mc_engine.text import clean_streams
     from mc_engine.unforeseen import UNFORESEEN, catch_all, refuse_small_memory, unforeseen
 
+    _refuse_lost_folder()
     install_handlers()  # before the rest is loaded, which takes longest
     collect_rarely()
     for library in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -42,5 +52,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    _refuse_lost_folder()
     _forget_working_folder()  # before anything else is imported
     main()

@@ -105,6 +105,16 @@ def test_with_little_memory_a_command_works_or_says_so(tmp_path, mib):
             assert "`ulimit -v`" in done.stderr
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="there a working folder cannot be removed")
+@pytest.mark.parametrize("started", ["-m mc_engine", "-P -m mc_engine"])  # the latter as by the installed command
+def test_a_working_folder_that_was_removed_is_told_and_is_no_unmet_requirement(tmp_path, started):
+    script = f'mkdir gone && cd gone && rmdir ../gone && exec "{sys.executable}" {started} check minimal'
+    done = subprocess.run(["sh", "-c", script], capture_output=True, text=True, cwd=tmp_path, check=False,
+                          env={**os.environ, "PYTHONPATH": str(ROOT)})  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr == "the working folder: No such file or directory; change to another folder first\n"
+
+
 def test_without_numbas_compiler_a_command_says_so(tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-m", "mc_engine", "check", "minimal"], capture_output=True, text=True,
