@@ -243,7 +243,9 @@ def finish(
     failed = failed_cases(counts)
     if failed == sum(counts.values()):
         named = shell_word(campaign or store.path / "campaign.toml")
-        typer.echo(f"no case completed; `mc-engine check {named}` looks for the reason in the model", err=True)
+        look = f"`mc-engine check {named}` looks for the reason in the model"
+        why = "the column `reason` of its cases says why" if store.manifest.get("imported") else look
+        typer.echo(f"no case completed; {why}", err=True)
     elif line := not_finite_line(store):
         typer.echo(f"not finite   {line}")
     _judge_failures(failed, max_failed)

@@ -111,15 +111,20 @@ class _LocalWorkers:
         held.enter_context(safe_import_path())
         held.enter_context(dask.config.set(LOCAL_CLUSTER))
         self._workers = workers
-        self.cluster = LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            dashboard_address="127.0.0.1:0",  # any free port: another run may use 8787
-            scheduler_kwargs={"dashboard": False},
-            silence_logs=logging.CRITICAL,  # `Dispatch` handles dead workers
-            memory_limit=0,  # Dask would kill or pause workers; `memory_mib` makes allocations fail
-            preload=["mc_engine.runner.worker_process"],
-        )
+        try:
+            self.cluster = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                dashboard_address="127.0.0.1:0",  # any free port: another run may use 8787
+                scheduler_kwargs={"dashboard": False},
+                silence_logs=logging.CRITICAL,  # `Dispatch` handles dead workers
+                memory_limit=0,  # Dask would kill or pause workers; `memory_mib` makes allocations fail
+                preload=["mc_engine.runner.worker_process"],
+            )
+        except RuntimeError as error:
+            why = f"the workers of this machine do not start: {str(error).rstrip('.')}"
+            below = 'in a script, runs with Dask stand below `if __name__ == "__main__":`, since workers read it, too'
+            raise WorkersLost(f"{why}; {below}") from error
         held.callback(self._close)
 
     def replace_lost(self) -> None:

@@ -2,11 +2,13 @@
 
 import gc
 import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from distributed import Client, LocalCluster
-from trapped import campaign_folder, files_of, trapped
+from trapped import ENVIRONMENT, campaign_folder, files_of, trapped
 
 from mc_engine import load_campaign
 from mc_engine.errors import CampaignError, EngineError, RunInterrupted, StoreError
@@ -172,6 +174,17 @@ def test_a_grid_without_a_seed_can_be_resumed_and_replayed(tmp_path):
     text = (folder / "campaign.toml").read_text().replace("seed = 1\n", "")
     store = runner.run(load_campaign("stones", text=text, directory=folder), tmp_path / "run")
     assert runner.replay(store.path, 7).equal
+
+
+def test_a_script_whose_workers_would_run_it_again_is_told_where_its_run_belongs(tmp_path):
+    (tmp_path / "script.py").write_text(
+        'from mc_engine import load_campaign, run\nrun(load_campaign("minimal"), "run", backend="dask", workers=1)\n'
+    )
+    done = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
+    assert done.returncode == 1
+    last = done.stderr.splitlines()[-1]
+    assert 'in a script, runs with Dask stand below `if __name__ == "__main__":`' in last
+    assert last.endswith("`mc-engine resume run --backend dask` flies the rest")
 
 
 def test_a_scheduler_that_is_not_there_leaves_a_run_that_can_be_resumed(campaign, tmp_path, monkeypatch):

@@ -198,3 +198,11 @@ def test_imported_histories_are_those_of_a_run(tmp_path, flown):
     assert "imported" in open_run(tmp_path / "run").store.manifest
     flown.histories().drop(columns="speed_m_s").to_csv(tmp_path / "history.csv", index=False)
     assert '"history.csv" has no column "speed_m_s"' in told(*words, "--out", tmp_path / "other", status=2)
+
+
+def test_a_table_without_a_number_is_not_blamed_on_the_model(tmp_path, flown):
+    campaign = python_campaign(tmp_path / "ball", cases=60)
+    metrics = [column.name for column in flown.columns if column.role == "metric"]
+    flown.cases().assign(**dict.fromkeys(metrics, np.nan)).to_csv(tmp_path / "results.csv", index=False)
+    words = ["import", tmp_path / "results.csv", "--campaign", campaign, "--out", tmp_path / "run", "--no-report"]
+    assert "no case completed; the column `reason` of its cases says why" in told(*words)
