@@ -6,7 +6,7 @@ from pathlib import Path
 
 from mc_engine.store.derived_files import FIGURES, derived_files
 from mc_engine.store.opening import open_store
-from mc_engine.store.run_files import RARE_EVENT, TUNING, kind_of, readable
+from mc_engine.store.run_files import RARE_EVENT, TUNING, kind_of, path_of, readable
 from reports.contents import build, titled
 from reports.document.blocks import Attachment, Document
 from reports.formats.html import render_html
@@ -61,7 +61,7 @@ def write_reports(
     unknown = [name for name in formats if name not in FORMATS]
     if unknown:
         raise ValueError(f'"{unknown[0]}" is no format of a report; use {", ".join(FORMATS)}')
-    path = Path(run_path)
+    path = path_of(run_path, "a report is made by the path of a run, and {} is none")
     document = _document(path, Path(template) if template else None, [Path(other) for other in beside])
     written, kept = [], derived_files(path)
     renderings = [FORMATS[name](document) for name in dict.fromkeys(formats)]

@@ -12,6 +12,7 @@ import pytest
 
 import mc_engine
 from mc_engine import model, statistics
+from reports import write_reports
 
 TUNING = """
 [campaign]
@@ -91,6 +92,8 @@ def _is_explained(argument, text):
         (lambda e, run: e.run(e.load_campaign("minimal"), 3), "out: int is no path"),
         (lambda e, run: e.load_campaign("minimal", text=b""), "text: bytes is no text; give the contents of the file"),
         (lambda e, run: e.load_campaign("minimal", upstream=3), "upstream: int is no path"),
+        (lambda e, run: e.resume(e.open_store(run), repair=True), "repaired by its path, and Store is none; its path"),
+        (lambda e, run: write_reports(e.open_store(run)), "made by the path of a run, and Store is none; its path"),
         (lambda e, run: e.run("minimal"), "campaign: 'minimal' is no Campaign; load_campaign makes one"),
         (lambda e, run: e.tune("minimal"), "campaign: 'minimal' is no Campaign"),
         (lambda e, run: e.case_table("minimal", [0]), "campaign: 'minimal' is no Campaign"),
@@ -109,9 +112,13 @@ def test_an_argument_of_another_type_is_rejected_in_one_sentence_and_nothing_is_
     assert {path: path.stat().st_mtime_ns for path in runs.rglob("*")} == before
 
 
-def test_paths_and_numbers_may_be_those_of_text_and_numpy(runs, monkeypatch):
+def test_paths_and_numbers_may_be_those_of_text_and_numpy(runs, monkeypatch, tmp_path):
     monkeypatch.chdir(runs)
     assert mc_engine.load_campaign("minimal", cases=np.int64(5), seed=np.int64(6)).seed == 6
     assert mc_engine.Store("runs/small").n_cases >= 8
+    counts = {"workers": np.int64(1), "chunk": np.int64(2)}
+    store = mc_engine.run(mc_engine.load_campaign("minimal", cases=4), tmp_path / "run", **counts)
+    assert mc_engine.extend(store.path, np.int64(6), **counts).missing() == []
+    assert mc_engine.extend(store.path, 7, workers=1, chunk=10**30).missing() == []
     with pytest.raises(mc_engine.CampaignError, match=r"--from needs a section \[inputs\]"):
         mc_engine.load_campaign("minimal", upstream="runs/small")

@@ -24,7 +24,7 @@ from mc_engine.runner.flown_campaign import campaign_of, companions_of, refuse_u
 from mc_engine.runner.histories import history_frame, inputs_of
 from mc_engine.runner.manifest import columns_of, manifest_of
 from mc_engine.runner.progress import ProgressCall
-from mc_engine.runner.sessions import Session, complete, fly_failed, refuse_no_count, session_of
+from mc_engine.runner.sessions import Session, complete, count_of, fly_failed, session_of
 from mc_engine.runner.shards import Shard, merge_shards
 from mc_engine.sampling.designs import block_problem, extension_problem
 from mc_engine.store.opening import open_store
@@ -169,7 +169,7 @@ def resume(
     []
     """
     if repair:
-        mend_journal(Path(path))
+        mend_journal(path_of(path, "a run is repaired by its path, and {} is none"))
     store = open_store(path)
     return complete(store, campaign_of(store), session_of(progress, workers, chunk, backend), repair)
 
@@ -200,7 +200,7 @@ def extend(
     >>> extend("runs/small", 12).n_cases
     12
     """
-    refuse_no_count("cases", cases)
+    cases = count_of("cases", cases)
     store = open_store(path)
     if sentence := extension_problem(store.manifest, store.n_cases, cases):
         raise StoreError(f"{path}: {sentence}")

@@ -30,7 +30,7 @@ from mc_engine.runner.pools import pool_of
 from mc_engine.runner.progress import ProgressCall
 from mc_engine.runner.summary import failed_cases
 from mc_engine.shell_words import shell_word
-from mc_engine.status import OK, STATUS_NAME
+from mc_engine.status import MOST_CASES, OK, STATUS_NAME
 from mc_engine.store.case_rows import remove_logs
 from mc_engine.store.opening import open_store
 from mc_engine.store.parts import Written, problem_of
@@ -55,21 +55,21 @@ def session_of(
     progress: ProgressCall | None, workers: int | None, chunk: int | None, backend: Backend | str
 ) -> Session:
     """A session from the arguments of the runner's functions; EngineError for one that nothing can be flown with."""
-    for name, number in (("workers", workers), ("chunk", chunk)):
-        if number is not None:
-            refuse_no_count(name, number)
+    workers = (os.cpu_count() or 1) if workers is None else count_of("workers", workers)
+    chunk = None if chunk is None else min(count_of("chunk", chunk), MOST_CASES)
     if progress is not None and not callable(progress):
         raise EngineError(f"progress: {progress!r} is no function of (cases done, cases wanted, cases failed)")
     backend = Backend(backend) if isinstance(backend, str) else backend
     if not isinstance(backend, Backend):
         raise EngineError(f'backend: {backend!r} is not allowed; it is a Backend or the name of one, as "threading"')
-    return Session(progress, workers or os.cpu_count() or 1, chunk, backend)
+    return Session(progress, workers, chunk, backend)
 
 
-def refuse_no_count(name: str, number: object) -> None:
-    """EngineError unless the argument of this name is a whole number from 1 on."""
+def count_of(name: str, number: object) -> int:
+    """The argument of this name as Python's int, also of NumPy's; EngineError unless it is a whole number from 1 on."""
     if not (isinstance(number, Integral) and int(number) >= 1):
         raise EngineError(f"{name}: {number!r} is not allowed; it must be a whole number from 1 on")
+    return int(number)
 
 
 def complete(store: Store, campaign: Campaign, session: Session, repair: bool = False) -> Store:
