@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from hashlib import sha256
+from math import inf
+from numbers import Real
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +51,10 @@ class Backend:
             raise EngineError(f'backend "{self.name}" is not known; there are {", ".join(BACKENDS)}')
         if self.scheduler is not None and self.name != "dask":
             raise EngineError(f'a scheduler is for the backend "dask", not for "{self.name}"')
+        for limit in ("case_seconds", "memory_mib", "patience_s"):
+            value = getattr(self, limit)
+            if value is not None and not (isinstance(value, Real) and 0.0 < float(value) < inf):
+                raise EngineError(f"{limit}: {value!r} is not allowed; it must be a number above 0")
         limited = self.case_seconds is not None or self.memory_mib is not None
         if limited and (flown_by := {"threading": "a thread", "cuda": "a card", "auto": "a card"}.get(self.name)):
             raise EngineError(f'{flown_by} cannot be limited in time or memory; fly with the backend "loky"')
@@ -87,7 +93,7 @@ def _refuse_no_address(scheduler: str) -> None:
 
     try:
         resolve_address(scheduler)
-    except (OSError, ValueError) as error:  # OSError: a host that is not known
+    except (OSError, ValueError, TypeError) as error:  # OSError: a host that is not known
         raise EngineError(f"--scheduler {scheduler}: {error}; write an address such as tcp://node1:8786") from None
 
 
