@@ -74,8 +74,8 @@ class Verdict:
         None with two limits
     enclosed : tuple or None, the two limits that they demonstrate, for a requirement with two: each moved inward by the
         same distance, the margin, or outward where that is negative
-    needed : int or None, cases that the run would have to be extended to (of a design that cannot be, cases of another
-        run) to demonstrate the share if no further one failed; None if it is decided
+    needed : int or None, cases to extend the run to that demonstrate the share if no further one fails, or of a new run
+        of a design that cannot be extended; None if it is decided
     accepted : int or None, most failures with which so many cases pass; None if they cannot
     consumer_risk : float or None, probability of passing a system that just misses the share; None where the number of
         cases was decided along the way, and then it is at most 1 - confidence
@@ -232,8 +232,8 @@ def judge_counted(
 def _joined(joint: Verdict, tests: Sequence[Verdict]) -> Verdict:
     """The verdict on the joint share with the outcome of all tests together."""
     failing = tuple(test.name for test in tests if test.shared_outcome == FAIL)
-    demonstrated = all(test.shared_outcome == PASS for test in tests)
-    joint = replace(joint, shared_outcome=FAIL if failing else PASS if demonstrated else NOT_DEMONSTRABLE)
+    shared = {test.shared_outcome for test in tests}
+    joint = replace(joint, shared_outcome=FAIL if failing else PASS if shared == {PASS} else NOT_DEMONSTRABLE)
     if failing:
         return replace(joint, outcome=FAIL, needed=None, failing=() if joint.outcome == FAIL else failing)
     if all(test.outcome == PASS for test in tests):
@@ -286,14 +286,13 @@ def _verdict(
     limits: ShareLimits = time_uniform if looked else binomial
     further: ShareLimits = time_uniform if design in EXTENSIBLE else limits  # an extended run is judged by it
     share, confidence = float(requirement["share"]), float(requirement["confidence"])
-    tried = counts.tried
-    passed = tried - counts.outside(which)
+    tried, passed = counts.tried, counts.tried - counts.outside(which)
     random = design in SAMPLING_DESIGNS
     known = random and tried > 0
     outcome, lower, upper = _outcome(limits, passed, tried, share, confidence) if known else _UNKNOWN
     shared = _outcome(limits, passed, tried, share, 1.0 - (1.0 - confidence) / among)[0] if known else outcome
     accepted = limits.acceptance_number(tried, share, confidence) if known else None
-    exact = known and not looked
+    exact, undecided = known and not looked, random and outcome == NOT_DEMONSTRABLE
     verdict = Verdict(
         name=str(requirement["name"]),
         metric=str(requirement["metric"]),
@@ -310,9 +309,7 @@ def _verdict(
         upper=upper,
         demonstrated=None,
         enclosed=None,
-        needed=further.smallest_sample(share, confidence, tried - passed)
-        if random and outcome == NOT_DEMONSTRABLE
-        else None,
+        needed=further.smallest_sample(share, confidence, tried - passed) if undecided else None,
         accepted=accepted,
         consumer_risk=binomial.pass_chance(tried, accepted, share) if exact else None,
         producer_risk=1.0 - binomial.pass_chance(tried, accepted, binomial.half_rate_share(share)) if exact else None,
