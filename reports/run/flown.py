@@ -28,8 +28,14 @@ ROUNDING = 1e-13  # of numbers of which another one is the difference
 SQUARABLE = 1e140  # largest number, and inverse of the smallest spread, whose squares over all cases can be summed
 NEGLIGIBLE_SPREAD = "standard deviation below a ten-millionth of the value"
 ZERO = 1e-20  # of the largest numbers in the same unit: what is below it is a zero but for rounding
+MARK = 1e12  # a larger number is mostly a mark, such as 1e30 for "never", beside which nothing was rounded
 ROUNDED_ZERO = "zero but for rounding"
 UNSQUARABLE = "numbers beyond 1e140 or a standard deviation below 1e-140"
+
+
+def rounded_zero(size: float, largest: float) -> bool:
+    """Whether numbers of this size are zero but for rounding beside the largest ones in their unit."""
+    return size < ZERO * min(largest, MARK)
 
 
 @dataclass(frozen=True)
@@ -311,9 +317,16 @@ class Flown:
             return UNSQUARABLE
         if self.limits(name) != Limits():
             return ""
-        if name in self.summaries and self.unit(name) and size < ZERO * self.largest_alike(name):
+        if self._rounded_zero(name):
             return ROUNDED_ZERO
         return NEGLIGIBLE_SPREAD if summary.sd < NEGLIGIBLE * size else ""
+
+    def _rounded_zero(self, name: str) -> bool:
+        """Whether a metric is zero but for rounding, by its own unit: a report tells a range and its error in two."""
+        own, summary = self.own, self.own.summaries.get(name)
+        if summary is None or not own.unit(name):
+            return False
+        return rounded_zero(max(abs(summary.minimum or 0.0), abs(summary.maximum or 0.0)), own.largest_alike(name))
 
     def unsquarable(self, *names: str) -> str:
         """The columns among these that have such numbers that nothing can be computed of their squares; else empty."""

@@ -65,8 +65,8 @@ def _instants(times: list[np.ndarray]) -> np.ndarray:
 
 
 def _envelope(grid: np.ndarray, times: list[np.ndarray], values: list[np.ndarray]) -> Envelope:
-    rows = [np.interp(grid, t, y, right=np.nan) for t, y in zip(times, values, strict=True)]
-    table = np.sort(np.array(rows), axis=0)  # flights that have ended last, as not-a-numbers
+    rows = np.array([np.interp(grid, t, y, right=np.nan) for t, y in zip(times, values, strict=True)])
+    table = np.sort(np.where(np.isfinite(rows), rows, np.nan), axis=0)  # not-a-numbers last, as flights that have ended
     flying = np.count_nonzero(np.isfinite(table), axis=0)
     curves = {}
     for probability in envelope_probabilities(len(times)):

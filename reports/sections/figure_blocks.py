@@ -18,7 +18,7 @@ from reports.figures.distributions import histogram, histograms
 from reports.figures.histories import Envelope, HistoryLine, history_figure, history_plot, phase_limits
 from reports.run.cloud_regions import cloud_regions
 from reports.run.default_figures import history_figures, scatter_figures
-from reports.run.flown import NEGLIGIBLE_SPREAD, ROUNDED_ZERO, UNSQUARABLE, ZERO, Flown
+from reports.run.flown import NEGLIGIBLE_SPREAD, ROUNDED_ZERO, UNSQUARABLE, Flown, rounded_zero
 from reports.run.history_bands import FEWEST_CASES, OUTER, fair_cases, history_envelopes, outer_percentile
 from reports.run.history_limits import history_limits
 from reports.run.outcomes import case_outcomes, outcome_names
@@ -228,12 +228,15 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
 
 
 def _rounded_zeros(flown: Flown, names: list[str]) -> list[str]:
-    """Those of these quantities that are nothing beside the largest one in their unit."""
-    sizes = {name: float(np.nanmax(np.abs(flown.histories[name].to_numpy(dtype=np.float64)))) for name in names}
+    """Those of these quantities that are nothing beside the largest one in their own unit."""
+    own, sizes = flown.own, {}
+    for name in names:
+        values = own.histories[name].to_numpy(dtype=np.float64)
+        sizes[name] = float(np.abs(values[np.isfinite(values)]).max())
     largest: dict[str, float] = {}
     for name, size in sizes.items():
-        largest[flown.unit(name)] = max(size, largest.get(flown.unit(name), 0.0))
-    return [name for name in names if flown.unit(name) and sizes[name] < ZERO * largest[flown.unit(name)]]
+        largest[own.unit(name)] = max(size, largest.get(own.unit(name), 0.0))
+    return [name for name in names if own.unit(name) and rounded_zero(sizes[name], largest[own.unit(name)])]
 
 
 @dataclass(frozen=True)

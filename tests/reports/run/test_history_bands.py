@@ -63,6 +63,20 @@ def test_where_few_still_fly_median_and_percentiles_end_and_the_extremes_go_on_t
         assert np.isfinite(band.curves[probability][band.at < 4.0]).all()
 
 
+def test_where_flights_are_infinite_there_is_no_band_of_them():
+    """A distance to what is not yet in sight: a warning about an invalid subtraction, and -inf as the smallest."""
+    flown = histories(np.arange(40.0))
+    flown.loc[flown["t_s"] < 3.0, "x_m"] = np.inf
+    flown.loc[flown["case_id"] < 2, "y_m"] = -np.inf
+    with np.errstate(all="raise"):
+        bands = history_envelopes(flown, range(40), ["x_m", "y_m"])
+    early = TIMES < 2.99
+    assert np.isnan(bands["x_m"].curves[0.0][early]).all()
+    np.testing.assert_allclose(bands["x_m"].curves[1.0][TIMES > 3.1], 39.0 * TIMES[TIMES > 3.1])
+    np.testing.assert_allclose(bands["y_m"].curves[0.0], -39.0 * TIMES)
+    np.testing.assert_allclose(bands["y_m"].curves[1.0], -2.0 * TIMES)
+
+
 def test_a_handful_of_cases_makes_no_band():
     assert history_envelopes(histories(np.ones(19)), range(19), ["x_m"]) == {}
 

@@ -10,6 +10,7 @@ from synthetic_run import synthetic_run
 from mc_engine.model.figures import HistoryFigure, MapFigure, ProfileFigure, ScatterFigure, to_record
 from reports.contents import build
 from reports.document.blocks import FigureBlock, Table, Text, blocks_of
+from reports.run.chosen_units import ShownRun
 from reports.run.flown import Flown
 from reports.run.history_limits import history_limits
 from reports.sections.tables import distribution_text, input_table
@@ -61,6 +62,25 @@ def test_a_zero_but_for_rounding_is_no_key_result_and_not_drawn():
     assert "crossrange [km]" not in drawn_labels(document)
     for said in (": crossrange.", " in all saved cases: crossrange."):
         assert f"Not drawn, zero but for rounding{said}" in sentences(document)
+
+
+def test_zeros_are_found_by_the_units_of_the_columns_and_not_beside_infinities_and_marks():
+    """A range told in m had hidden the crossrange in km, and the report ended with a KeyError; 1e30 for never made all
+    metrics in its unit zeros, and an infinite distance all histories."""
+    run = synthetic_run(400, failed=0)
+    sizes = {"range_km": 1e-5, "cross_km": 1e-40, "never_s": 1e30, "miss_s": 1.0}
+    for name, size in sizes.items():
+        run.table[name], run.history[name] = size * run.table["max_position_error_m"], size * run.history["force_n"]
+        run.manifest["columns"].append({"name": name, "unit": name[-2:].strip("_"), "role": "metric"})
+    run.history.loc[::7, "never_s"] = np.inf
+    run.manifest["figures"] = [to_record(HistoryFigure(("miss_s", "never_s"), "Way"))]
+    run.manifest["requirements"] = []
+    document = build(run, "run")
+    assert not any("zero but for rounding in all saved cases" in one for one in sentences(document))
+    shown, own = ShownRun(Flown(run, "run")), Flown(run, "run")
+    assert shown.unit("range_km") != shown.unit("cross_km")
+    for flown in (shown, own):
+        assert [name for name in sizes if flown.undrawn(name)] == ["cross_km"]
 
 
 @pytest.mark.parametrize("run", [narrow(0.1), narrow(1e-4, 7800.001)])
