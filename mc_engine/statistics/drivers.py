@@ -31,7 +31,7 @@ FEWEST = 5  # failed, and passed, cases for a single driver
 FEWEST_FOR_PAIRS = 10
 FEWEST_OF_SOBOL = 20  # for a single driver, where the cases are Sobol' points
 MOST_LEVELS = 20  # of a group that enters pairs
-MOST_ROWS = 20_000  # above: all failed cases up to half of it, the others picked evenly
+MOST_ROWS = 20_000  # above: half of it failed cases and half others, picked of each if they are more
 BINS = 10  # of the success probability along an input
 
 
