@@ -81,7 +81,8 @@ def outcomes(store: Store) -> "tuple[list[Verdict], Verdict | None]":
     """The same verdicts without the demonstrated bounds, for which alone the parts are read more than once."""
     import numpy as np
 
-    from mc_engine.statistics.requirements import LimitCounts, judge_counted
+    from mc_engine.statistics.limits import LimitCounts
+    from mc_engine.statistics.requirements import judge_counted
 
     requirements = store.manifest.get("requirements", [])
     if not requirements:

@@ -17,7 +17,7 @@ with the error allowed, 1 - confidence, divided by their number (Bonferroni); `s
 confidence, and those hold all at once.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -25,6 +25,7 @@ import numpy as np
 
 from mc_engine.sampling.designs import EXTENSIBLE
 from mc_engine.statistics import binomial, time_uniform, tolerance
+from mc_engine.statistics.limits import LimitCounts, limits_of
 from mc_engine.statistics.tolerance import Judged
 
 PASS = "pass"
@@ -40,7 +41,7 @@ CHOSEN_DESIGNS = ("grid", "one_at_a_time")
 
 def judged_by(requirement: Mapping[str, Any]) -> Judged:
     """What a requirement record is judged by; the limits are named if there are two."""
-    limits = _limit(requirement, "at_least"), _limit(requirement, "at_most")
+    limits = limits_of(requirement)
     return Judged(str(requirement["metric"]), *(limits if None not in limits else ()))
 
 
@@ -134,38 +135,6 @@ class Verdict:
         return min((distance for distance in (above, below) if distance is not None), default=None)
 
 
-class LimitCounts:
-    """How many cases are outside which limits: all that verdicts count, added up over the parts of a table.
-
-    A case that was not completed, or whose metric is not a number, is outside.
-    """
-
-    def __init__(self, requirements: Sequence[Mapping[str, Any]]):
-        self.requirements = requirements
-        self.tried = 0
-        self._outside, self._lost = np.zeros((2, len(requirements) + 1), dtype=np.int64)  # last: of any requirement
-
-    def add(self, column: Callable[[str], np.ndarray], ok: np.ndarray) -> None:
-        """Count cases.  column : metric to float64[n].  ok : bool[n]."""
-        self.tried += ok.size
-        kept = [inside_all([requirement], column, ok) for requirement in self.requirements]
-        numbers = [
-            ok & np.isfinite(np.asarray(column(str(requirement["metric"])), np.float64))
-            for requirement in self.requirements
-        ]
-        for counts, good in ((self._outside, kept), (self._lost, numbers)):
-            beyond = ~np.array(good, dtype=bool).reshape(len(good), ok.size)
-            counts += [*beyond.sum(axis=1), beyond.any(axis=0).sum()]
-
-    def outside(self, requirement: int = -1) -> int:
-        """Cases outside one requirement, named by its index, or outside any of them."""
-        return int(self._outside[requirement])
-
-    def without_number(self, requirement: int = -1) -> int:
-        """Cases without a number for one requirement, or for any of them."""
-        return int(self._lost[requirement])
-
-
 def judge_all(
     requirements: Sequence[Mapping[str, Any]],
     column: Callable[[str], np.ndarray],
@@ -226,11 +195,14 @@ def judge_counted(
     confidence = min(verdict.confidence for verdict in verdicts)
     asked = {"name": JOINT, "metric": "", "share": share, "confidence": confidence}
     alone = _verdict(asked, counts, -1, ranked, design, looked, among)
-    return verdicts, _joined(alone, [*verdicts, alone])
+    return verdicts, _joined(alone, [*verdicts, alone], _bounds_of(design, looked)[1])
 
 
-def _joined(joint: Verdict, tests: Sequence[Verdict]) -> Verdict:
-    """The verdict on the joint share with the outcome of all tests together."""
+def _joined(joint: Verdict, tests: Sequence[Verdict], further: ShareLimits) -> Verdict:
+    """The verdict on the joint share with the outcome of all tests together.
+
+    Cases needed are those for every requirement: of an extended run those that have passed are judged anew.
+    """
     failing = tuple(test.name for test in tests if test.shared_outcome == FAIL)
     shared = {test.shared_outcome for test in tests}
     joint = replace(joint, shared_outcome=FAIL if failing else PASS if shared == {PASS} else NOT_DEMONSTRABLE)
@@ -239,8 +211,8 @@ def _joined(joint: Verdict, tests: Sequence[Verdict]) -> Verdict:
     if all(test.outcome == PASS for test in tests):
         return replace(joint, outcome=PASS, needed=None)
     refuted = any(test.outcome == FAIL for test in tests)
-    needed = None if refuted else max((test.needed for test in tests if test.needed is not None), default=None)
-    return replace(joint, outcome=NOT_DEMONSTRABLE, needed=needed)
+    needed = [further.smallest_sample(test.share, test.confidence, test.tried - test.passed) for test in tests]
+    return replace(joint, outcome=NOT_DEMONSTRABLE, needed=None if refuted or not joint.random else max(needed))
 
 
 def joint_share(shares: Sequence[float]) -> float | None:
@@ -283,9 +255,9 @@ def _verdict(
     looked: bool,
     among: int,
 ) -> Verdict:
-    limits: ShareLimits = time_uniform if looked else binomial
-    further: ShareLimits = time_uniform if design in EXTENSIBLE else limits  # an extended run is judged by it
+    limits, further = _bounds_of(design, looked)
     share, confidence = float(requirement["share"]), float(requirement["confidence"])
+    at_least, at_most = limits_of(requirement)
     tried, passed = counts.tried, counts.tried - counts.outside(which)
     random = design in SAMPLING_DESIGNS
     known = random and tried > 0
@@ -296,8 +268,8 @@ def _verdict(
     verdict = Verdict(
         name=str(requirement["name"]),
         metric=str(requirement["metric"]),
-        at_most=_limit(requirement, "at_most"),
-        at_least=_limit(requirement, "at_least"),
+        at_most=at_most,
+        at_least=at_least,
         share=share,
         confidence=confidence,
         outcome=outcome,
@@ -320,6 +292,12 @@ def _verdict(
     if ranked is None or which < 0 or not known:
         return verdict
     return _with_limits_shown(verdict, judged_by(requirement), ranked)
+
+
+def _bounds_of(design: str, looked: bool) -> tuple[ShareLimits, ShareLimits]:
+    """What judges the cases that there are, and a run of more: an extended one, or a new one."""
+    extended = looked or design in EXTENSIBLE
+    return (time_uniform if looked else binomial), (time_uniform if extended else binomial)
 
 
 _UNKNOWN: tuple[str, float | None, float | None] = (NOT_DEMONSTRABLE, None, None)
@@ -367,33 +345,3 @@ def was_looked_at(manifest: Mapping[str, Any], n_cases: int, n_flown: int | None
     if n_flown is not None and n_flown < n_cases and not manifest.get("shard"):
         return True
     return bool(manifest.get("looks")) or n_cases > manifest.get("campaign", {}).get("cases", n_cases)
-
-
-def _limit(requirement: Mapping[str, Any], key: str) -> float | None:
-    value = requirement.get(key)
-    return None if value is None else float(value)
-
-
-def inside_all(
-    requirements: Iterable[Mapping[str, Any]], column: Callable[[str], np.ndarray], ok: np.ndarray
-) -> np.ndarray:
-    """bool[n]: completed, and inside the limits of all these requirement records.
-
-    column : metric to float64[n].  ok : bool[n].  Without a requirement every completed case is inside.
-    """
-    inside = np.array(ok, dtype=bool)
-    for requirement in requirements:
-        values = np.asarray(column(str(requirement["metric"])), dtype=np.float64)
-        inside &= inside_limits(values, _limit(requirement, "at_most"), _limit(requirement, "at_least"))
-    return inside
-
-
-def inside_limits(values: np.ndarray, at_most: float | None, at_least: float | None) -> np.ndarray:
-    """bool[n]: inside the limits that there are; a value that is not a number, or infinite, is not."""
-    inside = np.isfinite(values)
-    with np.errstate(invalid="ignore"):
-        if at_most is not None:
-            inside &= values <= at_most
-        if at_least is not None:
-            inside &= values >= at_least
-    return inside

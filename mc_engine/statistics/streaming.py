@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from mc_engine.statistics.limits import LimitCounts
 from mc_engine.statistics.moments import Spread, Tally, finite_values
 from mc_engine.statistics.order_statistics import QUANTILES, ranked_quantile, ranks_read
-from mc_engine.statistics.requirements import LimitCounts, Verdict, judge_counted, judged_by
+from mc_engine.statistics.requirements import Verdict, judge_counted, judged_by
 from mc_engine.statistics.selection import Selection
 from mc_engine.statistics.summary import Summary, summary_of, without_number
 from mc_engine.statistics.tolerance import Judged

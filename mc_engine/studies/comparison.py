@@ -17,6 +17,7 @@ from mc_engine.campaign.parts import COMPLETED
 from mc_engine.errors import EngineError
 from mc_engine.section import ReportSection
 from mc_engine.statistics.change_tests import MetricChange, ShareChange, holm, metric_change, share_change
+from mc_engine.statistics.limits import inside_all
 from mc_engine.statistics.requirements import (
     FAIL,
     JOINT,
@@ -24,7 +25,6 @@ from mc_engine.statistics.requirements import (
     PASS,
     SAMPLING_DESIGNS,
     Verdict,
-    inside_all,
     judge_all,
     was_looked_at,
 )

@@ -22,7 +22,7 @@ from mc_engine.model.faults import naming_faults
 from mc_engine.sampling.correlation import correlated, gaussian_copula
 from mc_engine.sampling.designs import RANDOM
 from mc_engine.sampling.distributions import Constant, Discrete, Empirical, quantiles
-from mc_engine.statistics.requirements import inside_limits
+from mc_engine.statistics.limits import inside_limits
 from mc_engine.statistics.worst import Limits
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.suggestions import hint, listed
@@ -69,7 +69,7 @@ class LimitState:
         with np.errstate(invalid="ignore"):
             margin = np.where(able, Limits(requirement.at_most, requirement.at_least).distances(metric), -np.inf)
         # a case right at its limit is inside: the engine's word for it, safe from rounding of the difference
-        inside = able & inside_limits(metric, requirement.at_most, requirement.at_least)
+        inside = able & inside_limits(metric, requirement.at_least, requirement.at_most)
         margin = np.where(inside, np.maximum(margin, AT_LIMIT), np.minimum(margin, 0.0))
         self.status.append(status)
         self.metric.append(metric)

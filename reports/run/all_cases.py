@@ -19,8 +19,8 @@ import pyarrow.compute as pc
 
 from mc_engine.runner.summary import metric_parts, streamed
 from mc_engine.statistics import Summary, Verdict, judge_all, summarize, was_looked_at, worst_cases
+from mc_engine.statistics.limits import LimitCounts
 from mc_engine.statistics.picked_cases import picked_rows
-from mc_engine.statistics.requirements import LimitCounts
 from mc_engine.statistics.worst import Limits, WorstSoFar, limits_on
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.store.store import Part, Store

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mc_engine.statistics import Verdict
-from mc_engine.statistics.requirements import inside_all
+from mc_engine.statistics.limits import inside_all
 from reports.run.flown import Flown
 from reports.text.numbers import count
 

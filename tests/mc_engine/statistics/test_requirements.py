@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import binom
 
 from mc_engine.statistics import judge, judge_all, pass_probability, was_looked_at
-from mc_engine.statistics.requirements import LimitCounts
+from mc_engine.statistics.limits import LimitCounts
 
 FUEL = {"name": "fuel", "metric": "propellant_kg", "at_most": 1.0, "at_least": None, "share": 0.9973, "confidence": 0.9}
 
@@ -212,6 +212,21 @@ def test_requirements_that_pass_alone_can_fail_together():
     verdicts, joint = both(fuel, speed)
     assert [verdict.shared_outcome for verdict in verdicts] == ["not demonstrable", "not demonstrable"]
     assert joint.outcome == "fail"  # 72 in all are too many, 36 of each are not surely
+
+
+def test_the_cases_needed_together_are_enough_for_a_requirement_that_has_passed_once_the_run_is_extended():
+    asked = [{**FUEL, "share": 0.9}, {**SPEED, "share": 0.96, "confidence": 0.9}]
+
+    def judged(n, looked):
+        table = {"propellant_kg": np.full(n, 0.5), "speed_m_s": np.full(n, 6.0)}
+        table["propellant_kg"][:2] = 1.5
+        return judge_all(asked, table.__getitem__, np.ones(n, dtype=bool), looked=looked)
+
+    verdicts, joint = judged(56, False)
+    assert [verdict.outcome for verdict in verdicts] == ["pass", "not demonstrable"]  # 52 are enough for fuel
+    assert joint.needed > verdicts[1].needed
+    for n, outcome in ((joint.needed, "pass"), (joint.needed - 1, "not demonstrable")):
+        assert judged(n, True)[1].outcome == outcome
 
 
 def test_a_shared_confidence_asks_more_of_each():
