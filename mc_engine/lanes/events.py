@@ -67,6 +67,7 @@ def _locate(f, method, signs, t, finish, s, m, p, o, length, end, g_start, g_end
     low, high, side = 0.0 * length, length, 0.0 * length
     g_low, g_high, at_end = g_start, g_end, g_end
     tolerance = 4.5e-16 * (abs(t) + length)
+    reach = 0.5 * tolerance
     for iteration in range(_ITERATIONS):
         if not any_lane(open_lanes):
             break
@@ -75,8 +76,11 @@ def _locate(f, method, signs, t, finish, s, m, p, o, length, end, g_start, g_end
         chord = (guess >= low) & (guess <= high)
         if iteration >= _SECANT_ITERATIONS:
             chord = chord & (not chord)
-        # a chord that meets an end is tried beyond the zero, within the tolerance: so the far end of the bracket comes
-        guess = where(chord, minimum(maximum(guess, low + 0.5 * tolerance), high - 0.5 * tolerance), middle)
+        # a chord that meets an end is tried beyond the zero: so the far end of the bracket comes; four times as far
+        # each time, for where rounding or a stretch of zeros keeps the sign from changing
+        away = minimum(maximum(guess, low + reach), high - reach)
+        reach = where(chord & (away != guess), 4.0 * reach, reach)
+        guess = where(chord & (away > low) & (away < high), away, middle)
         state = method.single(f, method.tables, t, guess, s, m, p, o)
         values = spread(f.events(minimum(t + guess, finish), state, m, p, o), t)
         after = any_field(map_fields(crossed, g_low, values, signs))

@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from flown_models import FOLDER, RAIL, flown, same_bytes
+from flown_models import FOLDER, RAIL, flown, inputs_of, same_bytes
 
+from mc_engine.flight.flight import fly_interpreted
+from mc_engine.flight.interpreted import InterpretedFlight
 from mc_engine.model import load_model
 
 
@@ -20,6 +22,22 @@ def test_a_stop_is_found_with_the_order_of_the_integrator():
     coarse, fine = (abs(swing_down(exact / (n + 0.5)) - exact) for n in (8, 16.5))
     assert coarse < 1e-5
     assert coarse / fine == pytest.approx((17.0 / 8.5) ** 4, rel=0.1)
+
+
+def test_an_event_function_that_is_rounded_is_looked_at_a_few_times():
+    # floats of this place lie 1e-9 m apart, which the fall takes a thousand times as long as times are exact to
+    class Counted(InterpretedFlight):
+        looks = 0
+
+        def call(self, name, function, arguments):
+            self.looks += name == "events" and arguments[0] % 4.0 > 0.0
+            return super().call(name, function, arguments)
+
+    for end in np.linspace(6_388_000.0, 6_388_500.0, 20):
+        fall = {"gravity_m_s2": 9.5, "v0_m_s": -130.0, "x0_m": 6_389_000.0, "end_m": float(end), "step_s": 4.0}
+        flight = Counted(RAIL)
+        assert fly_interpreted(flight, inputs_of(RAIL, fall), 0, 1)[2][0] == pytest.approx(end, abs=2e-9)
+        assert 3 <= flight.looks <= 30  # 60 to 90 where each went no further than the tolerance
 
 
 def test_a_time_limit_before_the_stop_is_no_stop_and_keeps_the_last_state():
