@@ -14,6 +14,14 @@ def _refuse_lost_folder() -> None:
         sys.exit(2)  # wrong usage
 
 
+def _refuse_build_time() -> None:
+    """End the process where NumPy cannot read the build time, which the import of SciPy makes it do."""
+    build_time = os.environ.get("SOURCE_DATE_EPOCH", "0")
+    if not build_time.isdecimal():
+        print(f"SOURCE_DATE_EPOCH: {build_time!a} is no whole number of seconds; correct or unset it", file=sys.stderr)
+        sys.exit(2)  # wrong usage
+
+
 def _forget_working_folder() -> None:
     """Remove the working folder, which `python -m` puts first, from the import path, unless the engine is in it.
 
@@ -32,6 +40,7 @@ def main() -> None:
     from mc_engine.unforeseen import UNFORESEEN, catch_all, refuse_small_memory, unforeseen
 
     _refuse_lost_folder()
+    _refuse_build_time()
     install_handlers()  # before the rest is loaded, which takes longest
     collect_rarely()
     for library in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from mc_engine.errors import UsageError
 from mc_engine.store.derived_files import FIGURES, derived_files
 from mc_engine.store.opening import open_store
 from mc_engine.store.run_files import RARE_EVENT, TUNING, kind_of, path_of, readable
@@ -48,7 +49,7 @@ USUAL = ("html", "pdf")
 
 def write_reports(
     run_path: str | Path,
-    formats: Sequence[str] = USUAL,
+    formats: str | Sequence[str] = USUAL,
     template: str | Path | None = None,
     beside: Sequence[str | Path] = (),
 ) -> list[Path]:
@@ -58,9 +59,9 @@ def write_reports(
     Returns the paths of the reports and of files that belong to them (a footprint's KML), not of a Markdown report's
     figures.  The contents are built once.  All files of a format appear together or not at all.
     """
-    unknown = [name for name in formats if name not in FORMATS]
-    if unknown:
-        raise ValueError(f'"{unknown[0]}" is no format of a report; use {", ".join(FORMATS)}')
+    formats = (formats,) if isinstance(formats, str) else formats
+    if unknown := [name for name in formats if name not in FORMATS]:
+        raise UsageError(f'"{unknown[0]}" is no format of a report; use {", ".join(FORMATS)}')
     path = path_of(run_path, "a report is made by the path of a run, and {} is none")
     document = _document(path, Path(template) if template else None, [Path(other) for other in beside])
     written, kept = [], derived_files(path)
@@ -78,7 +79,7 @@ def write_reports(
 
 def report(run_path: str | Path, format: str | None = None) -> list[Path]:
     """`write_reports` for one format, or for the page and the PDF without one."""
-    return write_reports(run_path, (format,) if format else USUAL)
+    return write_reports(run_path, format or USUAL)
 
 
 def _document(path: Path, template: Path | None, beside: Sequence[Path]) -> Document:

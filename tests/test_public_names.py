@@ -12,6 +12,9 @@ import pytest
 
 import mc_engine
 from mc_engine import model, statistics
+from mc_engine.physics.curves import curve, surface
+from mc_engine.runner.shards import Shard
+from mc_engine.studies.comparison import compare_runs
 from reports import write_reports
 
 TUNING = """
@@ -101,6 +104,13 @@ def _is_explained(argument, text):
         (lambda e, run: e.replay(run, 3.5), "a whole number from 0 to 7, and 3.5 is none"),
         (lambda e, run: e.run(e.load_campaign("minimal"), shard="1/2"), r"'1/2' is no Shard; Shard.parse\(\"1/2\"\)"),
         (lambda e, run: e.run(e.load_campaign("minimal"), backend=None), "backend: None is not allowed; it is a Back"),
+        (lambda e, run: e.run(e.load_campaign("minimal"), workers=True), "workers: True is not allowed; it must be"),
+        (lambda e, run: e.open_store(run).cases(3), "3 is no list of names of columns"),
+        (lambda e, run: e.open_store(run).cases("case_id"), "'case_id' is no list of names of columns"),
+        (lambda e, run: compare_runs(run, run, ("a", "b")), "compared by their stores, and 'runs/small' is none"),
+        (lambda e, run: Shard.parse("a/b"), '"a/b" is no shard; the third of twenty is 3/20'),
+        (lambda e, run: curve(""), '"" is a folder; name a CSV or Parquet file'),
+        (lambda e, run: surface(x=[0, 1], y=[0, 1], z=np.eye(2), units=["m"]), "units is a dict of a unit for each na"),
         (lambda e, run: e.extend(run, 2e3), r"cases: 2000\.0 is not allowed; it must be a whole number from 1 on"),
     ],
 )

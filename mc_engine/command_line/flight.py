@@ -35,7 +35,7 @@ from mc_engine.command_line.app import (
     write_reports,
 )
 from mc_engine.command_line.next_step import MERGE, after_flight, is_complete, journal_lines
-from mc_engine.errors import RunInterrupted
+from mc_engine.errors import RunInterrupted, UsageError
 from mc_engine.interruption import NOTHING_BEGUN, advise, raise_if_signalled
 from mc_engine.shell_words import shell_word
 from mc_engine.status import MOST_CASES
@@ -160,7 +160,7 @@ def _shard(text: str | None) -> "Shard | None":
 
     try:
         return None if text is None else Shard.parse(text)
-    except ValueError as error:
+    except UsageError as error:
         leave(USAGE, f"--shard {error}")
 
 

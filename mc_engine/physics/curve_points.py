@@ -96,13 +96,16 @@ _NUMBERS = {"double", "float", *(f"{sign}int{bits}" for sign in ("", "u") for bi
 def path_beside_caller(file: object) -> Path:
     """Path of a file that is named from the folder of the module that calls the function that calls this one.
 
-    ModelError for what is no name, such as points without the names of their arguments.
+    ModelError for a folder, and for what is no name, such as points without the names of their arguments.
     """
     if not isinstance(file, str | os.PathLike):
         what = type(file).__name__
         raise ModelError(f"the first argument is the name of a file, and {what} is none; give points as x=..., y=...")
     caller = sys._getframe(2).f_globals.get("__file__")
-    return (Path(caller).parent if caller else Path.cwd()) / file
+    path = (Path(caller).parent if caller else Path.cwd()) / file
+    if path.is_dir():
+        raise ModelError(f'"{file}" is a folder; name a CSV or Parquet file')
+    return path
 
 
 def array_of(values: Any, name: str, unit: str | None = None, dimensions: int = 1) -> np.ndarray:

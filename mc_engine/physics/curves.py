@@ -10,7 +10,7 @@ on both sides of an argument (see `_axis`).  An argument that is not a number gi
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -160,7 +160,9 @@ def surface(
     _refuse_unknown(outside, OUTSIDE, "outside")
     path = path_beside_caller(file) if file is not None else None
     words = f"the surface {file or ''}".rstrip()
-    given = units or {}
+    given = {} if units is None else units
+    if not isinstance(given, Mapping):
+        raise ModelError(f'{words}: units is a dict of a unit for each name, such as {{"x": "km"}}, not {units!r}')
     for name in given.keys() - ({str(x), str(y), str(z)} if path is not None else {"x", "y", "z"}):
         raise ModelError(f'{words}: units has "{name}", which is none of its numbers')
     if path is not None:

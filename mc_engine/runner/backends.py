@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from hashlib import sha256
-from math import inf
 from numbers import Real
 from pathlib import Path
 
@@ -53,8 +52,9 @@ class Backend:
             raise EngineError(f'a scheduler is for the backend "dask", not for "{self.name}"')
         for limit in ("case_seconds", "memory_mib", "patience_s"):
             value = getattr(self, limit)
-            if value is not None and not (isinstance(value, Real) and 0.0 < float(value) < inf):
-                raise EngineError(f"{limit}: {value!r} is not allowed; it must be a number above 0")
+            is_number = isinstance(value, Real) and not isinstance(value, bool)
+            if value is not None and not (is_number and 0 < value <= sys.float_info.max):
+                raise EngineError(f"{limit}: {value!r} is not allowed; it must be a finite number above 0")
         limited = self.case_seconds is not None or self.memory_mib is not None
         if limited and (flown_by := {"threading": "a thread", "cuda": "a card", "auto": "a card"}.get(self.name)):
             raise EngineError(f'{flown_by} cannot be limited in time or memory; fly with the backend "loky"')

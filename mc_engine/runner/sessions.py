@@ -67,7 +67,7 @@ def session_of(
 
 def count_of(name: str, number: object) -> int:
     """The argument of this name as Python's int, also of NumPy's; EngineError unless it is a whole number from 1 on."""
-    if not (isinstance(number, Integral) and int(number) >= 1):
+    if isinstance(number, bool) or not (isinstance(number, Integral) and int(number) >= 1):
         raise EngineError(f"{name}: {number!r} is not allowed; it must be a whole number from 1 on")
     return int(number)
 

@@ -43,11 +43,11 @@ class Shard:
 
     @classmethod
     def parse(cls, text: str) -> "Shard":
-        """The shard "3/20"; ValueError with a sentence if it is none."""
-        match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text)
+        """The shard "3/20"; UsageError if it is none."""
+        match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", str(text))
         shard = cls(*map(int, match.groups())) if match else cls(0, 0)
         if not 1 <= shard.number <= shard.of:
-            raise ValueError(f'"{text}" is no shard; the third of twenty is 3/20')
+            raise UsageError(f'"{text}" is no shard; the third of twenty is 3/20')
         return shard
 
     def cases(self, n_cases: int) -> range:

@@ -235,6 +235,8 @@ class Store:
 
         `attrs["units"]`, `["descriptions"]` and `["roles"]` describe the columns.  StoreError if a part is damaged.
         """
+        if isinstance(columns, str) or not isinstance(columns, Iterable | None):
+            raise StoreError(f"{self.path}: {columns!r} is no list of names of columns")
         chosen = self.columns if columns is None else tuple(self._column(name) for name in dict.fromkeys(columns))
         tables = [parts.read_part(self.path, part, chosen) for part in self.parts]
         return _data_frame(tables, chosen)

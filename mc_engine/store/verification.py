@@ -151,7 +151,8 @@ def _companion_problems(run: Path, journal: Scan) -> Iterator[Damage]:
         for item in damages(folder):
             yield Damage(f"{SENSITIVITY}/{item.what}", item.mended_by)
     elif flown and os.path.lexists(folder):
-        yield Damage(f"{SENSITIVITY}: is no folder with a run", IN_THE_WAY)
+        is_empty = _is_folder(folder) and not any(folder.iterdir())
+        yield Damage(f"{SENSITIVITY}: is no folder with a run", REPAIR if is_empty else IN_THE_WAY)
     elif flown:
         yield Damage(f"{SENSITIVITY}: {NO_FOLDER}", REPAIR)
 

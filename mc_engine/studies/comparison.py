@@ -166,6 +166,8 @@ def compare_runs(
 
     EngineError if they have no metric of the same name and unit: that nothing changed would be no answer.
     """
+    if no_store := [run for run in (a, b) if not isinstance(run, Store)]:
+        raise EngineError(f"runs are compared by their stores, and {no_store[0]!r} is none; open_store opens one")
     manifests, wanted = (a.manifest, b.manifest), (a.n_cases, b.n_cases)
     tables = a.cases(), b.cases()
     facts = tuple({fact["name"]: fact for fact in manifest["columns"]} for manifest in manifests)

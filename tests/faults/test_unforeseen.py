@@ -115,6 +115,14 @@ def test_a_working_folder_that_was_removed_is_told_and_is_no_unmet_requirement(t
     assert done.stderr == "the working folder: No such file or directory; change to another folder first\n"
 
 
+def test_a_build_time_that_numpy_cannot_read_is_told(tmp_path):
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "SOURCE_DATE_EPOCH": "abc"}
+    done = subprocess.run([sys.executable, "-m", "mc_engine", "run", "minimal", "--cases", "8"], capture_output=True,
+                          text=True, cwd=tmp_path, env=environment, check=False)  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr == "SOURCE_DATE_EPOCH: 'abc' is no whole number of seconds; correct or unset it\n"
+
+
 def test_without_numbas_compiler_a_command_says_so(tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-m", "mc_engine", "check", "minimal"], capture_output=True, text=True,

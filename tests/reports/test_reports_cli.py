@@ -5,6 +5,7 @@ import pytest
 from synthetic_run import synthetic_run
 
 import reports
+from mc_engine.errors import UsageError
 from mc_engine.store.store import Column, create_store
 
 PUBLIC = {"build", "render_html", "render_pdf", "replay_picture", "report", "write_reports"}
@@ -45,7 +46,7 @@ def test_no_path_of_this_machine_gets_into_the_page(run_path):
 
 
 def test_an_unknown_format_is_refused_before_anything_is_written(run_path):
-    with pytest.raises(ValueError, match='"docx" is no format of a report; use html, pdf, md'):
+    with pytest.raises(UsageError, match='"docx" is no format of a report; use html, pdf, md'):
         reports.write_reports(run_path, ["html", "docx"])
     assert not (run_path / "report.html").exists()
 

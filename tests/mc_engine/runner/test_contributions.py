@@ -13,7 +13,7 @@ from mc_engine.errors import CampaignError, RunInterrupted, StoreError
 from mc_engine.runner import runner
 from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
 from mc_engine.status import MOST_CASES
-from mc_engine.store.verification import damage
+from mc_engine.store.verification import REPAIR, damage, damages
 
 MODEL = Path(__file__).parent / "contributions" / "model.py"
 HEAD = '[campaign]\nmodel = "model.py"\ncases = 100\ndesign = "mc"\nseed = 3\n'
@@ -153,6 +153,16 @@ def test_what_took_the_place_of_the_flights_beside_a_run_is_damage_and_no_interr
     assert damage(run) == ["sensitivity: is no folder with a run"]
     with pytest.raises(StoreError, match=r"sensitivity: (Not a directory|is not empty and holds no run; empty it)"):
         runner.resume(run)  # `resume` of a run that was interrupted would say so without end
+
+
+def test_an_empty_folder_in_place_of_the_flights_beside_a_run_is_mended_by_resume(tmp_path):
+    run = tmp_path / "run"
+    place = runner.run(campaign(tmp_path, "[sensitivity]\ncases = 32\n"), run, workers=1).path / "sensitivity"
+    shutil.rmtree(place)
+    place.mkdir()
+    assert [item.mended_by for item in damages(run)] == [REPAIR]
+    runner.resume(run, repair=True)
+    assert damage(run) == []
 
 
 def test_inputs_that_are_correlated_are_one_group(tmp_path):
