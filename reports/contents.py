@@ -2,13 +2,14 @@
 
 from collections.abc import Iterator
 
+from mc_engine.store.store import Store
 from reports.contributors.sensitivity import sensitivity_blocks
 from reports.document.blocks import Block, Document, Found, Section, as_blocks, numbered
 from reports.document.glossary import GLOSSARY
 from reports.footprint.section import FootprintContents, footprint_contents
 from reports.formats.json_data import run_data
 from reports.run.chosen_units import ShownRun
-from reports.run.flown import Flown, Run
+from reports.run.flown import Flown
 from reports.sections.case_tables import case_table, worst_tables
 from reports.sections.convergence import convergence_blocks, integration_table
 from reports.sections.corridors import corridor_blocks
@@ -33,7 +34,7 @@ from reports.sections.single_cases import case_blocks, case_data
 from reports.sections.tables import fixed_table, quantile_table, range_table, status_table, summary_table
 
 
-def build(run: Run, name: str) -> Document:
+def build(run: Store, name: str) -> Document:
     """The report of a run; `name` is its directory's name, as commands in the report spell it."""
     own = Flown(run, name)
     flown = ShownRun(own)

@@ -6,22 +6,23 @@ import numpy as np
 import pandas as pd
 
 from mc_engine.store.run_files import NOMINAL_CASE
+from mc_engine.store.store import Store
 from mc_engine.studies.replay_files import LARGEST
 from reports.drawing import paper
 from reports.drawing.marks import Drawing
 from reports.drawing.pictures import render_picture
 from reports.figures.histories import HistoryLine, history_figure
-from reports.run.flown import Flown, Run
+from reports.run.flown import Flown
 from reports.run.phases import quantity_names
 from reports.sections.figure_blocks import is_constant, saved_histories
 
 
-def replay_picture(run: Run, case_id: int, history: pd.DataFrame) -> bytes:
+def replay_picture(run: Store, case_id: int, history: pd.DataFrame) -> bytes:
     """A PNG in the style of the reports.  history : t_s and the outputs of the case."""
     return render_picture(paper.svg(replay_drawing(run, case_id, history)), "png")
 
 
-def replay_drawing(run: Run, case_id: int, history: pd.DataFrame) -> Drawing:
+def replay_drawing(run: Store, case_id: int, history: pd.DataFrame) -> Drawing:
     """A panel a quantity that varies."""
     flown = Flown(run, "")
     columns = {name: history[name].to_numpy(dtype=np.float64) for name in quantity_names(history)}

@@ -111,11 +111,7 @@ def tune(
             workers=workers,
             progress=progress,
         )
-    raise_if_signalled()
-    for line in [f"tuning       {path}", *tuning_lines(record)]:
-        typer.echo(line)
-    for report_path in [] if no_report else write_reports(path, ("html", "pdf")):
-        typer.echo(f"report       {report_path}")
+    _echo_result(path, [f"tuning       {path}", *tuning_lines(record)], no_report)
 
 
 @app.command()
@@ -164,8 +160,13 @@ def rare(
         workers=workers,
         progress=lambda flown, failed: lines.tell(f"{flown:,} cases, {failed:,} of them failed"),
     )
+    _echo_result(path, [f"rare event   {path}", *rare_event_lines(estimate.result)], no_report)
+
+
+def _echo_result(path: Path, lines: list[str], no_report: bool) -> None:
+    """The lines of a result; then its reports are written."""
     raise_if_signalled()
-    for line in (f"rare event   {path}", *rare_event_lines(estimate.result)):
+    for line in lines:
         typer.echo(line)
     for report_path in [] if no_report else write_reports(path, ("html", "pdf")):
         typer.echo(f"report       {report_path}")

@@ -19,7 +19,6 @@ from mc_engine.physics.vectors import Matrix, Vector, added, cross, dot, unit
 Quaternion = namedtuple("Quaternion", "q0 q1 q2 q3")
 
 _PI, _TURN = 3.141592653589793, 6.283185307179586
-_TINY = 1e-300
 
 
 @physics

@@ -16,7 +16,7 @@ import pandas as pd
 from mc_engine.campaign.parts import COMPLETED
 from mc_engine.errors import EngineError
 from mc_engine.section import ReportSection
-from mc_engine.statistics.change_tests import MetricChange, ShareChange, holm, metric_change, share_change
+from mc_engine.statistics.change_tests import MetricChange, ShareChange, finite, holm, metric_change, share_change
 from mc_engine.statistics.limits import inside_all
 from mc_engine.statistics.requirements import (
     FAIL,
@@ -116,6 +116,22 @@ class Comparison:
     def n_tests(self) -> int:
         """Tests that were compared with alpha together."""
         return int(np.isfinite(_p_values(self.metrics, self.shares)).sum())
+
+    @property
+    def moved(self) -> tuple[MetricChange, ...]:
+        """The metrics that differ, the largest change first."""
+        different = [metric for metric in self.metrics if not metric.same and finite(metric.shift)]
+        return tuple(sorted(different, key=lambda change: -change.effect))
+
+    @property
+    def same(self) -> tuple[str, ...]:
+        """The metrics with nothing to tell."""
+        return tuple(metric.metric for metric in self.metrics if metric.same)
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """The metrics without a number in one of the runs."""
+        return tuple(metric.metric for metric in self.metrics if not metric.same and not finite(metric.shift))
 
     @property
     def shifted(self) -> tuple[MetricChange, ...]:

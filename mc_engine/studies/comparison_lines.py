@@ -6,7 +6,7 @@ from dataclasses import astuple
 import numpy as np
 
 from mc_engine.numbers_in_text import counted, percent_digits
-from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, finite, hidden_by_ties
+from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, hidden_by_ties
 from mc_engine.studies.comparison import Comparison
 from mc_engine.studies.run_changes import changed_lines
 
@@ -68,12 +68,7 @@ def _source_changes(comparison: Comparison) -> Iterator[str]:
 
 
 def _metric_table(comparison: Comparison) -> Iterator[str]:
-    same = [metric.metric for metric in comparison.metrics if metric.same]
-    moved = sorted(
-        (metric for metric in comparison.metrics if not metric.same and finite(metric.shift)),
-        key=lambda change: -change.effect,
-    )
-    rows = [_HEADINGS, *(_metric_cells(change, comparison) for change in moved)]
+    rows = [_HEADINGS, *(_metric_cells(change, comparison) for change in comparison.moved)]
     widths = [max(len(row[k]) for row in rows) for k in range(len(_HEADINGS))]
     for row in rows if len(rows) > 1 else []:
         cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
@@ -85,11 +80,10 @@ def _metric_table(comparison: Comparison) -> Iterator[str]:
         yield f"{_TIES}: so many cases have equal values that the size of a significant change is hidden; see --report"
     if any(_NO_INTERVAL in cell for row in rows for cell in row):
         yield f"{_NO_INTERVAL}: the cases, or those that differ between the runs, are too few for one"
-    if same:
-        yield f"the same in both runs: {', '.join(same)}"
-    absent = [metric.metric for metric in comparison.metrics if not metric.same and not finite(metric.shift)]
-    if absent:
-        yield f"without a number in one of the runs: {', '.join(absent)}"
+    if comparison.same:
+        yield f"the same in both runs: {', '.join(comparison.same)}"
+    if comparison.absent:
+        yield f"without a number in one of the runs: {', '.join(comparison.absent)}"
 
 
 def _metric_cells(change: MetricChange, comparison: Comparison) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from mc_engine.statistics.summary import nearly_equal
 from reports.drawing.palette import CIVIDIS, PAPER, blended
 from reports.text.numbers import number
 
@@ -195,7 +196,7 @@ class Axis:
         seen = np.log10(seen[seen > 0.0]) if self.log else seen
         low, high = (float(seen.min()), float(seen.max())) if seen.size else (0.0, 1.0)
         room = self.margin * (high - low)
-        if high - low <= 1e-12 * max(abs(low), abs(high)):
+        if nearly_equal(low, high):
             room = 0.05 * abs(high) or 1.0
         low, high = low - room, high + room
         return (10.0**low, 10.0 ** min(high, 308.0)) if self.log else (low, high)  # no float64 is larger

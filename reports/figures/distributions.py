@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from mc_engine.statistics import Quantile, Summary
+from mc_engine.statistics.summary import nearly_equal
 from reports.drawing.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot
 from reports.drawing.palette import BLUE, GREEN, INK, ORANGE, SKY, VERMILION
 from reports.text.numbers import count, counted, given_percent, interval, limit_number, number
@@ -136,7 +137,7 @@ def bin_edges(values: np.ndarray) -> np.ndarray:
     low, high = float(values.min()), float(values.max())
     if 0.0 < high - low < MOST_BINS and bool((values == np.round(values)).all()):
         return np.arange(low - 0.5, high + 1.0)
-    if high - low <= 1e-12 * max(abs(low), abs(high)):
+    if nearly_equal(low, high):
         half = max(abs(low), 1.0) * 1e-3
         return np.linspace(low - half, high + half, FEWEST_BINS + 1)
     spread = float(np.subtract(*np.percentile(values, [75, 25])))

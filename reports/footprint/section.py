@@ -25,7 +25,7 @@ from reports.footprint.landings import KILOMETRES, Landing, height_limit, landin
 from reports.footprint.map_files import MapOutline, Mark, Places, geojson, kml
 from reports.run.flown import Flown
 from reports.sections.figure_blocks import thinned_rows
-from reports.sections.tables import quantile_cell
+from reports.sections.tables import quantile_cell, used_cell
 from reports.text.numbers import count, counted, given_percent, number, percent
 
 DRAWN_REGION = 0.9  # content of the one region in the figure; more would hide the ellipses
@@ -286,9 +286,8 @@ def _distance_row(flown: Flown, landing: Landing, place: Mark) -> tuple[Cell, ..
     )
     spread = summary.spread
     cells = [quantile_cell(flown, item, spread, 4) for item in summary.quantiles]
-    used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
     largest = Cell(number(summary.maximum, 4, spread), summary.maximum)
-    return (Cell(place.name, small=_place_words(place.latitude, place.longitude)), used, *cells, largest)
+    return (Cell(place.name, small=_place_words(place.latitude, place.longitude)), used_cell(summary), *cells, largest)
 
 
 # ---- the files

@@ -10,7 +10,7 @@ pattern that could meet that of a design.
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -30,21 +30,9 @@ MOST_SAMPLED = 200_000
 MOST_SINGLE = 10  # worst cases of a metric, and failed cases
 
 
-class Run(Protocol):
-    """What a report needs of a store."""
-
-    @property
-    def manifest(self) -> dict[str, Any]: ...
-    @property
-    def n_cases(self) -> int: ...
-    def cases(self) -> pd.DataFrame: ...
-    def nominal(self) -> dict[str, Any]: ...
-    def histories(self) -> pd.DataFrame: ...
-
-
-def all_cases(run: Run, confidence: float, probabilities: tuple[float, ...]) -> "HeldCases":
+def all_cases(run: Store, confidence: float, probabilities: tuple[float, ...]) -> "HeldCases":
     """The cases of a run, held or streamed.  probabilities, confidence : of the summaries' quantiles."""
-    if isinstance(run, Store) and sum(part.rows for part in run.parts) * len(run.columns) > MOST_CELLS:
+    if sum(part.rows for part in run.parts) * len(run.columns) > MOST_CELLS:
         return StreamedCases(run, confidence, probabilities)
     return HeldCases(run, run.cases(), confidence, probabilities)
 
@@ -58,7 +46,7 @@ def without_attributes(table: pd.DataFrame) -> pd.DataFrame:
 class HeldCases:
     """table : a row for each of the cases at hand: here, all of them."""
 
-    def __init__(self, run: Run, table: pd.DataFrame, confidence: float, probabilities: tuple[float, ...]):
+    def __init__(self, run: Store, table: pd.DataFrame, confidence: float, probabilities: tuple[float, ...]):
         self.manifest, self.table = run.manifest, without_attributes(table)
         self.n_wanted = int(run.n_cases)
         self.confidence, self.probabilities = confidence, probabilities

@@ -120,10 +120,10 @@ def contributions(flown: "Flown") -> Contributions | None:
 
 def companion_of(flown: "Flown") -> Store | None:
     """The flights beside the run, if all of them are there."""
-    path = getattr(flown.run, "path", None)  # a Run of tests has none
-    if path is None or not is_run_directory(path / SENSITIVITY):
+    path = flown.run.path / SENSITIVITY
+    if not is_run_directory(path):
         return None
-    store = open_store(path / SENSITIVITY)
+    store = open_store(path)
     return None if store.missing() else store
 
 

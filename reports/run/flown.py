@@ -17,7 +17,8 @@ from mc_engine.statistics import CHOSEN_DESIGNS, SAMPLING_DESIGNS, Summary, Verd
 from mc_engine.statistics.first_order import Contributor, contributors
 from mc_engine.statistics.worst import Limits, limits_on
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
-from reports.run.all_cases import Run, all_cases, without_attributes
+from mc_engine.store.store import Store
+from reports.run.all_cases import all_cases, without_attributes
 from reports.run.contributions import Contributions
 from reports.run.contributions import contributions as contributions_of
 from reports.text.numbers import axis_label, count, named, same_lengths, words
@@ -65,7 +66,7 @@ class Flown:
     cases (counts, summaries, verdicts, worst and failed ones) comes from `every`.
     """
 
-    def __init__(self, run: Run, name: str):
+    def __init__(self, run: Store, name: str):
         self.run = run
         self.name = name
         self.manifest = run.manifest
@@ -155,10 +156,14 @@ class Flown:
         }
         return axis_label(named(self.words(name), meanings.get(name, "")), self.unit(name))
 
+    @property
+    def fixed(self) -> list[Mapping[str, Any]]:
+        """The records of the parameters and settings, which all cases share."""
+        return [record for key in ("parameters", "settings") for record in self.manifest.get(key, [])]
+
     def absence(self, *names: str) -> str:
         """Why the table of cases lacks one of the columns, as the end of a sentence; empty if it lacks none."""
-        records = [record for key in ("parameters", "settings") for record in self.manifest.get(key, [])]
-        shared = {str(record["name"]): str(record.get("unit", "")) for record in records}
+        shared = {str(record["name"]): str(record.get("unit", "")) for record in self.fixed}
         for name in names:
             if name in self.cases.columns:
                 continue
@@ -249,10 +254,9 @@ class Flown:
     @cached_property
     def integration(self) -> Integration | None:
         """How finer steps change the metrics, by the journal's last note on it; None where there is none."""
-        notes = getattr(self.run, "notes", None)
-        for entry in reversed(notes("finished") if callable(notes) else []):
-            with suppress(TypeError, ValidationError):
-                return Integration(**entry.facts.get("integration"))
+        for entry in reversed(self.run.notes("finished")):
+            with suppress(ValidationError):
+                return Integration.model_validate(entry.facts.get("integration"))
         return None
 
     def integration_share(self, metric: str) -> float | None:

@@ -11,7 +11,7 @@ from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.drawing.marks import Drawing, Plot
 from reports.figures.rows import SPREAD, level_panel
 from reports.run.flown import Flown
-from reports.sections.tables import quantile_cell
+from reports.sections.tables import quantile_cell, used_cell
 from reports.text.numbers import axis_label, count, given_percent, interval, number, percent
 
 MOST_LEVELS = 20
@@ -111,10 +111,9 @@ def _level_table(
         cells = cells or [Cell("–") for _ in probabilities]
         if flown.chosen:
             cells.insert(0, Cell(number(summary.minimum, 4, summary.spread), summary.minimum))
-        used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
         end = Cell(number(worst, 4, summary.spread), worst)
         against = _difference_cells(flown, values, matched, place)
-        body.append((Cell(level), used, *cells, end, *against))
+        body.append((Cell(level), used_cell(summary), *cells, end, *against))
     title = f"{axis_label(flown.words(metric), flown.unit(metric))} by {flown.words(name)}{flown.sample_words}"
     return Table(
         title[:1].upper() + title[1:], columns, tuple(body), _pairing_note(flown, levels[0], bool(len(matched)))

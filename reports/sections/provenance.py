@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from mc_engine.store.store import Store
 from reports.document.blocks import Cell, Column, Table
 from reports.run.flown import Flown
 from reports.text.numbers import count, exact, number, with_unit, words
@@ -60,7 +59,7 @@ def git_text(git: Mapping[str, Any] | None) -> str:
 def _timing_facts(flown: Flown) -> Iterator[tuple[str, str]]:
     """The numbers among the journal's notes on finished runs; the later ones count."""
     facts: dict[str, float] = {}
-    for entry in flown.run.notes("finished") if isinstance(flown.run, Store) else []:
+    for entry in flown.run.notes("finished"):
         facts |= {name: float(value) for name, value in entry.facts.items() if type(value) in (int, float)}
     for name, value in facts.items():
         yield f"timing: {words(name, 's')}", with_unit(number(value, 4), "s" if name.endswith("_s") else "")

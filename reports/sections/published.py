@@ -135,8 +135,7 @@ STATISTICS: dict[str, Callable[[Summary], float]] = {
 
 def _shared_inputs(flown: Flown) -> dict[str, Any]:
     """Value of every input that all cases share."""
-    records = [record for key in ("parameters", "settings") for record in flown.manifest.get(key, [])]
-    return {record["name"]: record.get("value") for record in records}
+    return {record["name"]: record.get("value") for record in flown.fixed}
 
 
 def _holds(row: Mapping[str, Any], at: Mapping[str, Any]) -> bool:

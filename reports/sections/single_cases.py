@@ -5,7 +5,6 @@ more cases, it holds those that its figures draw, the worst ones and those that 
 """
 
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -187,7 +186,7 @@ def _all_histories(flown: Flown) -> pd.DataFrame:
     """The run's histories and those of cases that were replayed since."""
     kept = set(flown.histories["case_id"]) if len(flown.histories) else set()
     quantities = flown.manifest.get("quantities", [])
-    replays = [read_replay(_folder(flown), case, quantities) for case in _replayed(flown) if case not in kept]
+    replays = [read_replay(flown.run.path, case, quantities) for case in _replayed(flown) if case not in kept]
     replayed = [flown.told_table(table) for table in replays]
     tables = [table for table in (flown.histories, *replayed) if len(table)]
     return pd.concat(tables, ignore_index=True) if tables else flown.histories
@@ -195,13 +194,7 @@ def _all_histories(flown: Flown) -> pd.DataFrame:
 
 def _replayed(flown: Flown) -> list[int]:
     """Cases of the table that `mc-engine replay` left a history of in the run."""
-    return (
-        [case for case in replayed_cases(_folder(flown)) if flown.every.has(case)] if hasattr(flown.run, "path") else []
-    )
-
-
-def _folder(flown: Flown) -> Path:
-    return Path(getattr(flown.run, "path", ""))
+    return [case for case in replayed_cases(flown.run.path) if flown.every.has(case)]
 
 
 def _quantities(flown: Flown, histories: dict[int, dict[str, tuple[Any, Any]]]) -> list[str]:

@@ -59,9 +59,10 @@ def summary_table(flown: Flown) -> Table:
         cells = [(value, number(value, scale=summary.spread)) for value in (nominal, summary.mean)]
         cells += [(summary.sd, "0" if summary.constant and summary.sd else number(summary.sd, scale=summary.spread))]
         cells += [(value, number(value, scale=summary.spread)) for value in (summary.minimum, summary.maximum)]
-        used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
         shape = [shape_cell(summary)] if flown.random else []
-        rows.append((metric_cell(flown, name), used, *(Cell(text, value) for value, text in cells), *shape))
+        rows.append(
+            (metric_cell(flown, name), used_cell(summary), *(Cell(text, value) for value, text in cells), *shape)
+        )
     note = "Used / tried: cases with a number, of all cases flown."
     if flown.random:
         note += (
@@ -83,7 +84,7 @@ def range_table(flown: Flown) -> Table:
     rows = tuple(
         (
             metric_cell(flown, name),
-            Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used),
+            used_cell(summary),
             Cell(number(flown.nominal_value(name), scale=summary.spread), flown.nominal_value(name)),
             *(_end_cell(flown, name, summary, end) for end in (summary.minimum, summary.maximum)),
         )
@@ -113,6 +114,11 @@ def _end_cell(flown: Flown, name: str, summary: Summary, value: float | None) ->
 def metric_cell(flown: Flown, name: str) -> Cell:
     """A metric with its unit; below, its meaning, or its column's name."""
     return Cell(axis_label(flown.words(name), flown.unit(name)), small=flown.columns[name].description or name)
+
+
+def used_cell(summary: Summary) -> Cell:
+    """Cases with a number, of all cases flown."""
+    return Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
 
 
 def shape_cell(summary: Summary) -> Cell:
@@ -146,8 +152,7 @@ def quantile_table(flown: Flown) -> Table | None:
     rows = []
     for name, summary in drawn.items():
         cells = [quantile_cell(flown, item, summary.spread) for item in summary.quantiles if item.probability in shown]
-        used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
-        rows.append((Cell(axis_label(flown.words(name), flown.unit(name))), used, *cells))
+        rows.append((Cell(axis_label(flown.words(name), flown.unit(name))), used_cell(summary), *cells))
     each = given_percent(flown.stated.confidence)
     note = (
         f"In brackets: distribution-free limits from order statistics, each holding with {each}{_for_fixed(flown)}; "
@@ -200,13 +205,7 @@ def _status_row(word: str, cases: int, tried: int, text: str) -> tuple[Cell, ...
 
 def fixed_table(flown: Flown, caption: str, overridden: bool) -> Table | None:
     """Parameters and settings that all cases share: those that the campaign file sets, or the others; None for none."""
-    records = [
-        record
-        for key in ("parameters", "settings")
-        for record in flown.manifest.get(key, [])
-        if bool(record.get("overridden")) == overridden
-    ]
-    return value_table(records, caption)
+    return value_table([record for record in flown.fixed if bool(record.get("overridden")) == overridden], caption)
 
 
 def value_table(records: Iterable[Mapping[str, Any]], caption: str) -> Table | None:

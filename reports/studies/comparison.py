@@ -1,7 +1,7 @@
 """What `mc-engine compare A B --report FILE` writes: the comparison of two runs as a page or as a PDF."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple
 from pathlib import Path, PurePosixPath
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from mc_engine.durable_file import write_durably
 from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, finite, hidden_by_ties
+from mc_engine.store.store import Store
 from mc_engine.studies.comparison import Comparison, VerdictChange
 from mc_engine.studies.run_changes import Difference
 from mc_engine.units import convert
@@ -28,7 +29,7 @@ from reports.document.blocks import (
 from reports.formats.html import render_html
 from reports.formats.pdf import render_pdf
 from reports.run.chosen_units import ShownRun, chosen_unit
-from reports.run.flown import Flown, Run
+from reports.run.flown import Flown
 from reports.studies.comparison_figure import change_figure
 from reports.studies.comparison_overlays import overlay_blocks
 from reports.text.numbers import SPACE, axis_label, count, counted, fixed, given_percent, number, percent, words
@@ -75,7 +76,7 @@ GLOSSARY = Terms(
 )
 
 
-def write_comparison(comparison: Comparison, path: Path, runs: tuple[Run, Run] | None = None) -> Path:
+def write_comparison(comparison: Comparison, path: Path, runs: tuple[Store, Store] | None = None) -> Path:
     """Write the comparison to `path`, a page if it ends in .html, else a PDF; the file appears whole or not at all.
 
     runs : A and B, whose distributions, histories and footprints are laid over one another.
@@ -86,7 +87,7 @@ def write_comparison(comparison: Comparison, path: Path, runs: tuple[Run, Run] |
     return path
 
 
-def build_comparison(comparison: Comparison, runs: tuple[Run, Run] | None = None) -> Document:
+def build_comparison(comparison: Comparison, runs: tuple[Store, Store] | None = None) -> Document:
     """The comparison as a document: requirements first, then metrics, then what was edited in code and campaign."""
     overlays: tuple[Block, ...] = ()
     units = {change.metric: chosen_unit(comparison.units[change.metric], change.mean) for change in comparison.metrics}
@@ -213,28 +214,21 @@ def _metric_blocks(comparison: Comparison, units: Mapping[str, str]) -> Iterator
         yield change_figure(comparison, drawn)
     if moved:
         yield _metric_table(comparison, units, moved)
-    same = [metric.metric for metric in comparison.metrics if metric.same]
-    if same:
-        yield f"The same in both runs: {_listed(comparison, same)}."
-    absent = [metric.metric for metric in comparison.metrics if not metric.same and not finite(metric.shift)]
-    if absent:
-        yield f"Without a number in one of the runs: {_listed(comparison, absent)}."
+    if comparison.same:
+        yield f"The same in both runs: {_listed(comparison, comparison.same)}."
+    if comparison.absent:
+        yield f"Without a number in one of the runs: {_listed(comparison, comparison.absent)}."
 
 
-def _listed(comparison: Comparison, metrics: list[str]) -> str:
+def _listed(comparison: Comparison, metrics: Sequence[str]) -> str:
     return ", ".join(words(metric, comparison.units[metric]) for metric in metrics)
 
 
 def _ranked(comparison: Comparison) -> list[MetricChange]:
     """The metrics that differ: those that changed beyond chance first, of them the largest effect first."""
 
-    def significant(change: MetricChange) -> bool:
-        return change.shift_adjusted <= comparison.alpha or change.spread_adjusted <= comparison.alpha
-
-    return sorted(
-        (metric for metric in comparison.metrics if not metric.same and finite(metric.shift)),
-        key=lambda change: (not significant(change), -change.effect),
-    )
+    significant = {change.metric for change in (*comparison.shifted, *comparison.spread)}
+    return sorted(comparison.moved, key=lambda change: change.metric not in significant)
 
 
 def _metric_table(comparison: Comparison, units: Mapping[str, str], moved: list[MetricChange]) -> Table:

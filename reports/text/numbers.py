@@ -8,6 +8,7 @@ from itertools import pairwise
 from math import floor, isfinite, log10
 
 from mc_engine.numbers_in_text import decimals_of, outward, percent_digits
+from mc_engine.statistics.summary import nearly_equal
 from mc_engine.units import UNITS, unit_suffix
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
@@ -17,7 +18,6 @@ MOST_GIVEN = 14  # of a limit that somebody wrote; more are of a conversion
 LONGEST_SYMBOL = 3  # letters
 LONGEST_LABEL = 44  # letters of an axis label, without its unit
 SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-_ROUNDING = 1e-12  # of the size of two numbers: closer ones count as equal
 _NEGLIGIBLE = 1e-6  # of a spread
 
 
@@ -57,10 +57,10 @@ def number(value: float | None, digits: int = 5, scale: float | None = None, up:
         room = max(decimals_of(value, MOST_DIGITS), 0)
         decimals = min(max(2 - floor(log10(scale)), 0), room, MOST_DIGITS)
     value = value if up is None else outward(value, decimals, up)
-    text = f"{value:,.{decimals}f}" if abs(value) >= 1e4 else f"{value:.{decimals}f}"
-    if scale is None:
-        text = _trim(text)
-    return "0" if float(text.replace(",", "")) == 0.0 else text.replace(",", SPACE).replace("-", "−")
+    text = fixed(value, decimals)
+    if not text.strip("0."):
+        return "0"
+    return _trim(text) if scale is None else text
 
 
 def limit_number(value: float) -> str:
@@ -100,7 +100,7 @@ def column_texts(values: Sequence[float | None]) -> list[str]:
     """
     numbers = [value for value in values if value is not None and isfinite(value)]
     distinct = sorted(set(numbers))
-    apart = [b for a, b in pairwise(distinct) if b - a > _ROUNDING * max(abs(a), abs(b))]
+    apart = [b for a, b in pairwise(distinct) if not nearly_equal(a, b)]
     if not apart:
         return [number(value, 4) for value in values]
     largest, spread = max(map(abs, numbers)), distinct[-1] - distinct[0]

@@ -5,10 +5,13 @@ of the same two inputs.  Has the reading half of a store's interface.
 """
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+
+from mc_engine.store.store import Store
 
 BURN_M_S, ANGLE_RAD = 177.20997, 0.7715809
 EXHAUST_M_S = 9.80665 * 246.0
@@ -37,14 +40,21 @@ QUANTITIES = [
 
 
 @dataclass
-class SyntheticRun:
-    """What `mc_engine.store.store.open_store` gives to a report."""
+class SyntheticRun(Store):
+    """What `mc_engine.store.store.open_store` gives to a report: of a run without replays, notes and flights beside."""
 
     manifest: dict[str, Any]
     table: pd.DataFrame
     nominal_row: dict[str, Any]
     history: pd.DataFrame = field(default_factory=pd.DataFrame)
     wanted: int = 0
+    campaign_text: str = ""
+    path = Path("/nowhere")
+    columns: tuple[Any, ...] = ()
+    parts: tuple[Any, ...] = ()
+
+    def notes(self, event: str) -> list[Any]:
+        return []
 
     @property
     def n_cases(self) -> int:

@@ -1,7 +1,6 @@
 """One probability and one confidence in all of a report: [report] of the campaign file, else 99.73 % with 90 %."""
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -91,10 +90,7 @@ def test_a_comparison_states_its_intervals_with_the_confidence_of_the_second_run
     reach = []
     for confidence in (0.9, 0.99):
         runs[1].manifest["report"] = {"probability": 0.9973, "confidence": confidence}
-        compared = compare_runs(
-            *(SimpleNamespace(manifest=run.manifest, campaign_text="", cases=run.cases, n_cases=400) for run in runs),
-            ("a", "b"),
-        )
+        compared = compare_runs(*runs, ("a", "b"))
         force = next(one.shift for one in compared.metrics if one.metric == "peak_force_n")
         reach.append(force.upper - force.lower)
         text = render_markdown(build_comparison(compared)).decode().replace("\u202f", " ")

@@ -2,7 +2,6 @@
 
 import warnings
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -25,9 +24,8 @@ def compared(shift=0.0, seed=1, n=400, failed=3, text="", names=("before", "afte
     for own, moved, words in ((1, 0.0, "[campaign]"), (seed, shift, text or "[campaign]")):
         made = synthetic_run(n, failed=min(failed, n), seed=own)
         made.table["peak_force_n"] += moved
-        runs.append(
-            SimpleNamespace(manifest=made.manifest, campaign_text=words, cases=made.cases, n_cases=made.n_cases)
-        )
+        made.campaign_text = words
+        runs.append(made)
     return compare_runs(*runs, names)
 
 
@@ -119,7 +117,7 @@ def test_many_changes_are_drawn_in_panels_that_find_room_on_a_page_that_is_begun
         for k, values in enumerate(draws):
             made.table[f"error_{k}_m"] = values
             made.manifest["columns"].append({"name": f"error_{k}_m", "unit": "m", "role": "metric", "description": ""})
-        runs.append(SimpleNamespace(manifest=made.manifest, campaign_text="", cases=made.cases, n_cases=made.n_cases))
+        runs.append(made)
     document = build_comparison(compare_runs(*runs, ("before", "after")))
     (drawing,) = [one.drawing for one in blocks_of(document, FigureBlock) if one.drawing.form.startswith("Changes")]
     rows = [text for plot in drawing.plots[::2] for _, text in plot.y.ticks]
@@ -250,7 +248,7 @@ def test_a_significant_change_that_ties_hide_has_no_size_of_no_change():
         made = synthetic_run(1000, failed=0, seed=len(runs) + 1)
         draws = np.random.Generator(np.random.Philox(key=7)).random(1000)
         made.table["settling_time_s"] = np.where(draws < pulses, 1.0, 0.0)
-        runs.append(SimpleNamespace(manifest=made.manifest, campaign_text="", cases=made.cases, n_cases=made.n_cases))
+        runs.append(made)
     found = compare_runs(*runs, ("before", "after"))
     change = next(one for one in found.metrics if one.metric == "settling_time_s")
     assert change.shift_adjusted <= found.alpha
