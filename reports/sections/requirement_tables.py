@@ -65,7 +65,7 @@ def requirement_table(flown: Flown) -> Table:
         Column("Demonstrated", "text") if flown.random else None,
         Column("Margin", "number") if flown.random else None,
         Column("Inside / tried", "number"),
-        Column("Demonstrated probability" if flown.random else "Fraction of these cases", "number"),
+        Column("Fraction inside" if flown.random else "Fraction of these cases", "number"),
         Column("Verdict", "text"),
     )
     columns = tuple(column for column in shown if column is not None)
@@ -76,7 +76,7 @@ def requirement_table(flown: Flown) -> Table:
         "Margin: from the demonstrated bound (tolerance limit) to the nearest limit; in brackets, relative to the "
         "size of the limit, or to half the distance between two. Of two limits, the demonstrated bounds are both as "
         "far inside, or outside, as the margin. Bounds and margins are rounded to the unfavourable side. "
-        f"Demonstrated probability: observed fraction of the cases, in brackets {_bounds_named(flown)}. "
+        f"Fraction inside: of the cases tried, in brackets {_bounds_named(flown)}. "
         if flown.random
         else "The cases were chosen, not drawn at random: a fraction of them is no probability, demonstrated or not. "
     )
@@ -94,9 +94,10 @@ def requirement_table(flown: Flown) -> Table:
 
 def _bounds_named(flown: Flown) -> str:
     if not flown.looked:
-        return "the Clopper–Pearson bounds, each holding with the confidence required"
+        return "the Clopper–Pearson bounds on the probability, each holding with the confidence required"
     return (
-        "bounds that hold, each with the confidence required, at every number of cases at once (Robbins’ mixture): "
+        "bounds on the probability that hold, each with the confidence required, at every number of cases at once "
+        "(Robbins’ mixture): "
         "the number of cases was not fixed in advance"
     )
 
