@@ -23,7 +23,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mc_engine.sampling.designs import EXTENSIBLE
+from mc_engine.sampling.designs import EXTENSIBLE as EXTENSIBLE  # reports take it from here
 from mc_engine.statistics import binomial, time_uniform, tolerance
 from mc_engine.statistics.limits import LimitCounts, limits_of
 from mc_engine.statistics.tolerance import Judged

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from mc_engine.model.figures import MapFigure
 from mc_engine.statistics import Summary, Verdict
+from mc_engine.statistics.requirements import EXTENSIBLE
 from mc_engine.statistics.worst import Limits
 from mc_engine.status import OK, STATUS_NAME
 from reports.document.blocks import Card
@@ -32,12 +33,12 @@ def _verdict_card(flown: Flown, verdict: Verdict) -> Card:
     return Card(
         label=verdict.name,
         answer=verdict.outcome,
-        detail=f"{asked} for {wanted}: {counted}{_because(verdict)}.",
+        detail=f"{asked} for {wanted}: {counted}{_because(flown, verdict)}.",
         tone=TONES[verdict.outcome],
     )
 
 
-def _because(verdict: Verdict) -> str:
+def _because(flown: Flown, verdict: Verdict) -> str:
     """The counts behind a verdict, as the end of a sentence."""
     lost = f", {count(verdict.no_number)} of the others without a number" if verdict.no_number else ""
     if verdict.lower is None or verdict.upper is None:
@@ -50,10 +51,17 @@ def _because(verdict: Verdict) -> str:
         return f"{lost}; the true probability is at most {percent(verdict.upper, up=True)}"
     alone = not verdict.metric and verdict.outcome != "pass" and verdict.lower >= verdict.share
     but = ", but not every requirement is demonstrated by itself" if alone else ""
-    further = (
-        f"; {count(verdict.needed)} cases without a further failure would demonstrate it" if verdict.needed else ""
-    )
-    return f"{lost}; the true probability is at least {percent(verdict.lower)}{but}{further}"
+    return f"{lost}; the true probability is at least {percent(verdict.lower)}{but}{_further(flown, verdict)}"
+
+
+def _further(flown: Flown, verdict: Verdict) -> str:
+    """How many cases would demonstrate it: of this run extended, or of a new one where this one cannot be extended."""
+    if not verdict.needed:
+        return ""
+    cases = f"{count(verdict.needed)} cases"
+    if flown.design in EXTENSIBLE and not flown.manifest.get("upstream"):
+        return f"; {cases} without a further failure would demonstrate it"
+    return f"; a new run of {cases} with no more failures would demonstrate it"
 
 
 def cost_cards(flown: Flown) -> tuple[Card, ...]:

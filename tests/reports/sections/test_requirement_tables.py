@@ -186,6 +186,13 @@ def test_a_joint_verdict_that_waits_for_a_requirement_alone_says_so():
     assert risk_table(built).rows[0][2].text == "too few cases"
 
 
+@pytest.mark.parametrize("changes", [{"campaign": {**mc(400), "design": "lhs"}}, {"upstream": {"name": "deorbit"}}])
+def test_a_run_that_cannot_be_extended_needs_a_new_one(changes):
+    (card,) = verdict_cards(flown(400, requirements=[FUEL], **{"campaign": mc(400), **changes}))
+    assert "; a new run of " in card.detail
+    assert card.detail.endswith(" cases with no more failures would demonstrate it.")
+
+
 def test_a_key_result_stands_beside_its_limit():
     for limit, words in (({}, ", limit 2.5"), ({"at_least": -1.0}, ", limits −1 to 2.5")):
         built = flown(2000, campaign=mc(2000), requirements=[{**FUEL, **limit}])
