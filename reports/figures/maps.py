@@ -50,7 +50,8 @@ def surface_method(surface: SurfaceMap, unit: str) -> str:
     if surface.exact:
         return f"exact, every grid node is a case ({used})"
     if surface.cases_per_node:
-        return f"mean of {count(surface.cases_per_node)} cases at each grid node ({used})"
+        most = "up to " if surface.n_used < surface.n_tried else ""  # a node may have lost some of its cases, or all
+        return f"mean of {most}{count(surface.cases_per_node)} cases at each grid node ({used})"
     assert surface.error is not None  # a smoothed surface always has one
     errors = [number(float(pick(surface.error)), 2) for pick in (np.nanmedian, np.nanmax)]
     if surface.n_smoothed < surface.n_used:

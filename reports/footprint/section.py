@@ -81,8 +81,8 @@ def _landing_blocks(flown: Flown, landing: Landing, stem: str) -> Iterator[Figur
         which = "all" if shown == landing.rows.size else f"{count(shown)} of"
         yield (
             f"{stem}.kml and {stem}.geojson beside this report hold {which} "
-            f"{counted(landing.rows.size, 'impact point')} with case number and "
-            "status, and the outlines of all regions, for a globe or a map."
+            f"{counted(landing.rows.size, 'impact point')} with case number and status"
+            f"{', and the outlines of all regions' * bool(landing.footprint.ellipses)}, for a globe or a map."
         )
 
 

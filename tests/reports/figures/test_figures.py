@@ -11,6 +11,7 @@ from figure_marks import FORMS
 from synthetic_run import synthetic_run
 
 from mc_engine.model.figures import ScatterFigure, to_record
+from mc_engine.statistics.maps import map_metric
 from reports.contents import build
 from reports.document.blocks import FigureBlock, blocks_of
 from reports.drawing import lettering, paper, screen
@@ -19,6 +20,7 @@ from reports.drawing.palette import INK
 from reports.drawing.strokes import Frame, stroked
 from reports.figures.distributions import bin_edges
 from reports.figures.histories import thinned
+from reports.figures.maps import surface_method
 from reports.figures.rows import margin_figure
 from reports.figures.statistics import correlation_matrix
 from reports.text.numbers import same_lengths
@@ -208,3 +210,11 @@ def test_a_label_too_long_for_its_panel_is_broken_into_lines():
     panels = paper.svg(Drawing("three", (plot, plot, plot), 3))
     lines = [text for text in re.findall(r">([^<]+)</text>", panels) if re.search("[a-z]{2}", text)]
     assert max(map(lettering.width, lines)) <= paper.WIDTH / 3.0
+
+
+@pytest.mark.parametrize(("lost", "words"), [(0, "mean of 2 cases"), (1, "mean of up to 2 cases")])
+def test_a_node_of_a_grid_that_lost_a_case_is_not_the_mean_of_all(lost, words):
+    x, y = (axis.repeat(2) for axis in (np.arange(9.0) // 3, np.arange(9.0) % 3))
+    z = x + y + 0.1 * (np.arange(18) % 2)
+    z[:lost] = np.nan
+    assert surface_method(map_metric(x, y, z), "km").startswith(f"{words} at each grid node ({18 - lost} of 18")

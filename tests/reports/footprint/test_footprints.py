@@ -147,6 +147,7 @@ def test_chosen_cases_have_points_and_no_regions():
     assert not marks_of(blocks(document, FigureBlock)[0].drawing, Line, "5")
     assert not marks_of(blocks(document, FigureBlock)[0].drawing, Line, "CEP")
     assert "No regions: the cases of the design “grid” are chosen, not drawn." in sentences(document)
+    assert "outlines" not in sentences(document)
     distances = next(one for one in blocks(document, Table) if one.caption == "Distances along the ground")
     assert [column.title for column in distances.columns] == ["Distance from", "Used / tried", "Largest [km]"]
 
