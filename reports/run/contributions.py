@@ -1,8 +1,9 @@
 """Contributors: the share of each metric's variance that comes from each input, and from the random draws.
 
-From the flights beside the run where it has them ([sensitivity]), else from the table of cases, which tells less: what
-it cannot assign to an input is a row of its own.  An input that only names a random draw has no row there: its values
-have no order that a trend or a surrogate model could follow, so that its effect is part of the unexplained share.
+From the flights beside the run where it has them ([sensitivity]), from the blocks of a run of the design saltelli, or
+from the table of cases, which tells less: what it cannot assign to an input is a row of its own.  An input that only
+names a random draw has no row there: its values have no order that a trend or a surrogate model could follow, so that
+its effect is part of the unexplained share.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy  # loads its packages when they are used
 
+from mc_engine.statistics.designed_indices import designed_indices
 from mc_engine.statistics.moments import number_or_none
 from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
 from mc_engine.statistics.picked_cases import picked_rows
@@ -115,6 +117,8 @@ def contributions(flown: "Flown") -> Contributions | None:
     if store is not None:
         every = [fact.name for fact in flown.with_role("metric")]
         return _of_companion(flown, store, list(dict.fromkeys([*metrics, *every])))
+    if flown.design == "saltelli":
+        return _of_blocks(flown, metrics)
     return _of_table(flown, metrics) if flown.random and flown.n_held >= FEWEST_CASES else None
 
 
@@ -142,6 +146,20 @@ def _of_companion(flown: "Flown", store: Store, metrics: list[str]) -> Contribut
     used = {metric: int(n) for metric, n in zip(metrics, indices.n_used, strict=True)}
     members = {group["name"]: list(group["members"]) for group in record["groups"]}
     return Contributions(by_metric, len(cases), used, indices.n_tried, members)
+
+
+def _of_blocks(flown: "Flown", metrics: list[str]) -> Contributions:
+    """The indices of Saltelli's blocks, which are the cases of the run."""
+    values = {name: flown.values(name) for name in metrics}
+    indices = designed_indices(flown.design, flown.case_ids, flown.inputs, values, flown.stated.confidence)
+    errors = _errors(flown)
+    shares = [(indices.values[name], indices.reach[name] / errors) for name in ("first_order", "total")]
+    by_metric = {
+        metric: _ranked(flown, metric, indices.inputs, *((share[:, k], error[:, k]) for share, error in shares))
+        for k, metric in enumerate(metrics)
+    }
+    used = {metric: int(n) for metric, n in zip(metrics, indices.n_used, strict=True)}
+    return Contributions(by_metric, 0, used, indices.n_tried, {})
 
 
 def _of_table(flown: "Flown", metrics: list[str]) -> Contributions | None:
@@ -183,8 +201,7 @@ def _ranked(
     shares : values and standard errors float64[n_names] of the first-order and total effects, and of the fall.
     unassigned : share of the variance that no input explains; any total effect may be larger by it.
     """
-    # standard errors on each side of an interval
-    errors = float(scipy.special.ndtri(0.5 * (1.0 + flown.stated.confidence)))
+    errors = _errors(flown)
     rows = []
     for row, name in enumerate(names):
         known = [(float(value[row]), errors * float(error[row])) for value, error in shares]
@@ -194,6 +211,11 @@ def _ranked(
             fall, fall_ends = _inside(*known[2], -np.inf, 1.0) if known[2:] else (None, None)
             rows.append(Contributor(metric, name, first, total, first_ends, total_ends, fall, fall_ends))
     return tuple(sorted(rows, key=lambda contributor: -contributor.size))
+
+
+def _errors(flown: "Flown") -> float:
+    """Standard errors on each side of an interval."""
+    return float(scipy.special.ndtri(0.5 * (1.0 + flown.stated.confidence)))
 
 
 def _inside(value: float, reach: float, low: float, high: float) -> tuple[float | None, Interval | None]:

@@ -42,9 +42,25 @@ def _surfaces(flown: Flown, figures: Sequence[MapFigure]) -> Surfaces:
             metrics.setdefault((figure.x, figure.y), []).append(figure.metric)
     surfaces: Surfaces = {}
     for (x, y), names in metrics.items():
-        mapped = map_metrics(flown.values(x), flown.values(y), [flown.values(name) for name in names])
+        mapped = map_metrics(flown.values(x), flown.values(y), [_apart(flown, x, y, name) for name in names])
         surfaces.update({(x, y, name): surface for name, surface in zip(names, mapped, strict=True)})
     return surfaces
+
+
+def _apart(flown: Flown, x: str, y: str, metric: str) -> np.ndarray:
+    """float64[n_held], the metric of the cases that a surface over x and y is fitted to; NaN of all others.
+
+    Most cases of a Saltelli block have the x and y of another one and nearly all of its other inputs: taken for
+    independent cases, they would lend each other certainty, and cross-validation would follow their noise.  The first
+    of them with a number stands for all.
+    """
+    values = flown.values(metric)
+    if flown.design != "saltelli":
+        return values
+    used = np.flatnonzero(np.isfinite(values))
+    places = np.column_stack([flown.values(x)[used], flown.values(y)[used]])
+    first = used[np.unique(places, axis=0, return_index=True)[1]]
+    return np.where(np.isin(np.arange(values.size), first), values, np.nan)
 
 
 def _map_block(flown: Flown, figure: MapFigure, surfaces: Surfaces) -> FigureBlock | str:
@@ -88,9 +104,8 @@ def _too_little_explained(flown: Flown, figure: MapFigure, share: float) -> str:
         for contributor in flown.contributors(figure.metric)
         if np.isfinite(flown.values(contributor.name)).any()
     ]
-    values = flown.values(figure.metric)
     pairs = {
-        (a, b): explained_share(flown.values(a), flown.values(b), values)
+        (a, b): explained_share(flown.values(a), flown.values(b), _apart(flown, a, b, figure.metric))
         for a, b in combinations(names[:STRONGEST_INPUTS], 2)
         if {a, b} != {figure.x, figure.y}
     }

@@ -7,6 +7,9 @@ from synthetic_run import SyntheticRun, fly, synthetic_run
 from mc_engine.sampling.designs import unit_cube
 from reports.contents import build
 from reports.document.blocks import FigureBlock, Table
+from reports.formats.json_data import run_data
+from reports.run.flown import Flown
+from reports.sections.map_blocks import map_blocks
 
 
 def designed(design, n_cases=600, lost=()):
@@ -51,3 +54,22 @@ def test_effects_that_are_all_the_same_have_no_deviation_of_rounding():
     linear = [row for row in table.rows if row[0].text.startswith("settling")]
     assert [row[4].text for row in linear] == ["0", "0"]
     assert [row[2].small for row in linear] == ["± 0", "± 0"]
+
+
+def test_the_indices_of_saltelli_are_data_too():
+    (table,) = [block for block in section(designed("saltelli")) if isinstance(block, Table)]
+    records = {(one.metric, one.input): one for one in run_data(Flown(designed("saltelli"), "run"))["contributors"]}
+    strongest = records["propellant_kg", "ve_pct"]
+    assert (strongest.first, strongest.total) == pytest.approx([cell.value for cell in table.rows[0][2:]])
+    half = float(table.rows[0][3].small.removeprefix("± "))
+    assert strongest.total_interval[1] - strongest.total == pytest.approx(half, rel=0.1)
+
+
+def test_cases_of_a_block_at_one_place_count_once_in_a_map():
+    """They differ in other inputs one by one; as independent cases they gave a map of their noise."""
+    run = designed("saltelli")
+    ve, oe = (np.repeat(run.table[name][:120], 5).to_numpy() for name in ("ve_pct", "oe_pct"))
+    table = run.table.assign(ve_pct=ve, oe_pct=oe, **fly(ve, oe))
+    flown = Flown(SyntheticRun(run.manifest, table, run.nominal_row, run.history), "run")
+    (drawn, *_) = [block.drawing.alternative for block in map_blocks(flown) if isinstance(block, FigureBlock)]
+    assert "nearest of 120 of 600 cases" in drawn
