@@ -96,8 +96,9 @@ def _driver_table(flown: Flown, drivers: Drivers, failed: Mapping[str, np.ndarra
         f"{count(drivers.singles_tested)} tests of single inputs and {count(drivers.pairs_tested)} of pairs; "
         f"false-discovery rate of each kind at most {percent(FALSE_DISCOVERIES)} (Benjamini–Hochberg). "
         "Separation: Cliff’s delta, 1 if all failed cases are separated from all passed ones, 0 if none. A pair is "
-        "listed if it separates better than each of its inputs; its cell is made of outer thirds. Inputs "
-        "correlated with a contributor are listed too."
+        "listed if its inputs act together: failures depend on both beyond what each explains alone. Its separation is "
+        "that of its cell, the thirds of both inputs where most cases fail. Inputs correlated with a contributor are "
+        "listed too."
     )
     if left_out:
         note += f" {count(left_out)} weaker ones are not shown."

@@ -35,9 +35,17 @@ def inside_words(flown: Flown, verdicts: Sequence[Verdict] | None = None) -> str
 
 
 def failures(flown: Flown) -> Mapping[str, np.ndarray]:
-    """bool[n_held] by requirement: not inside it; and, if cases failed, not completed."""
+    """bool[n_held] by requirement: not inside it; and, if cases failed, not completed.
+
+    Requirements that the same cases miss stand together: "fuel, completed".
+    """
     violations = {verdict.name: ~inside(flown, [verdict]) for verdict in flown.verdicts}
-    return violations if flown.ok.all() else {**violations, COMPLETED: ~flown.ok}
+    if not flown.ok.all():
+        violations[COMPLETED] = ~flown.ok
+    names: dict[bytes, list[str]] = {}
+    for name, cases in violations.items():
+        names.setdefault(cases.tobytes(), []).append(name)
+    return {", ".join(same): violations[same[0]] for same in names.values()}
 
 
 def case_outcomes(flown: Flown) -> np.ndarray:
