@@ -108,7 +108,7 @@ def _estimate_row(flown: Flown, name: str, run: RunningEstimate) -> tuple[Cell, 
         ),
         Cell(number(float(run.estimate[-1]), scale=sd), float(run.estimate[-1]), interval(low, high, sd)),
         Cell(reach, run.reach),
-        Cell(percent(run.halves_p), run.halves_p),
+        Cell(percent(round(run.halves_p, 4)), run.halves_p),
         _converged_cell(run),
     )
 

@@ -1,5 +1,6 @@
 """The convergence section of a report, and reports of runs with next to nothing in them."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +10,7 @@ from synthetic_run import synthetic_run
 from reports.document.blocks import FigureBlock, Table
 from reports.drawing.ticks import log_ticks
 from reports.run.flown import Flown
+from reports.sections import convergence
 from reports.sections.convergence import convergence_blocks, integration_table
 from reports.sections.headline import warnings
 
@@ -78,3 +80,11 @@ def test_a_metric_that_is_rounding_beside_others_in_its_unit_has_no_error_of_int
     flown = Flown(run, "run")
     assert flown.integration_share("correction_impulse_m_s") is None
     assert flown.integration_share("entry_speed_m_s") > 0.0
+
+
+def test_a_probability_beside_one_has_no_digits_of_rounding(monkeypatch):
+    """Fisher's test gave 0.9999999999 for halves that are the same, which stood there as 99.99999999 %."""
+    estimate = convergence.running_quantile
+    same = lambda *given: replace(estimate(*given), halves_p=1.0 - 1e-10)  # noqa: E731
+    monkeypatch.setattr(convergence, "running_quantile", same)
+    assert blocks(synthetic_run(2000))[1].rows[1][5].text == "100\u202f%"
