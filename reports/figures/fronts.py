@@ -7,7 +7,7 @@ import numpy as np
 
 from reports.drawing.marks import Axis, Drawing, Line, Mark, Plot, Points, nominal_ring, stepped
 from reports.drawing.palette import BLUE, INK, MUTED, ORANGE, SKY, VERMILION
-from reports.text.numbers import count
+from reports.text.numbers import counted
 
 MOST_PANELS = 6
 MARGIN = 0.06  # of the shown range
@@ -40,13 +40,15 @@ def front_figure(
     for i, k in pairs:
         marks: list[Mark] = []
         for tint, (words, number, shown) in zip((MUTED, SKY), candidates, strict=True):
-            key = f"{count(number)} {words}" * bool(number)
+            key = f"{words}: {counted(number, 'candidate')}" * bool(number)
             marks.append(Points(shown[:, i], shown[:, k], tint, words, opacity=0.45, key=key))
         x, y = front[:, i], front[:, k]
         if len(pairs) == 1:
             steps = stepped(x, y) if first_small else stepped(y, x)[::-1]
             marks.append(Line(*steps, colour, "front", width=1.6))
-        marks.append(Points(x, y, colour, name, size=6.0, key=f"{name}: {count(len(x))} candidates" if len(x) else ""))
+        marks.append(
+            Points(x, y, colour, name, size=6.0, key=f"{name}: {counted(len(x), 'candidate')}" if len(x) else "")
+        )
         for place, (point, values) in enumerate(published):
             marks.append(nominal_ring((values[i], values[k]), (VERMILION, INK)[place % 2], point))
         plots.append(Plot(tuple(marks), axes[i], axes[k], height=440.0 if len(pairs) == 1 else 340.0))

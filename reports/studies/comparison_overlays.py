@@ -32,7 +32,7 @@ def overlay_blocks(runs: tuple[Flown, Flown], metrics: Sequence[str]) -> Iterato
     """Figures of what both runs have; metrics : those whose distributions are drawn, in this order."""
     panels = tuple(panel for name in metrics[:MOST_PANELS] if (panel := _distribution(runs, name)) is not None)
     if panels:
-        caption = "Distributions of the metrics that differ, significant changes first."
+        caption = "Distributions of the metrics whose numbers differ, significant changes first."
         if max(run.n_held for run in runs) > 1.0 / TAILS[0]:
             caption += f" Beyond the axes: at most {percent(TAILS[0], 1)} of the cases of each run, at either end."
         yield FigureBlock(caption, Drawing(FORM, panels, 3), "small")

@@ -28,7 +28,7 @@ from reports.studies.tuning_tables import (
     provenance_table,
     published_table,
 )
-from reports.text.numbers import SPACE, count
+from reports.text.numbers import SPACE, count, counted
 from reports.text.source_places import of_source
 
 GLOSSARY = Terms(
@@ -131,12 +131,13 @@ def _objective_cards(tuned: Tuned) -> Iterator[Card]:
         if not tuned.record.feasible:  # what no allowed candidate reaches is no result
             continue
         ends = [tuned.with_unit(objective["name"], float(end)) for end in (values.min(), values.max())]
-        best, other = ends if objective["goal"] == "minimise" else ends[::-1]
+        small = objective["goal"] == "minimise"
+        best, other = ends if small else ends[::-1]
         yield Card(
-            label=f"{objective['name']}, to be {'small' if objective['goal'] == 'minimise' else 'large'}",
+            label=f"{objective['name']}, to be {'small' if small else 'large'}",
             answer=best,
             detail=f"{metric_words(tuned, objective)}{quantile_words(objective)}; "
-            f"up to {other} at the other end of the front.",
+            f"{'up' if small else 'down'} to {other} at the other end of the front.",
         )
 
 
@@ -152,8 +153,8 @@ def _search_warnings(tuned: Tuned) -> Iterator[str]:
     if failed:
         ends = tuned.evaluations["commonest_failure"][tuned.evaluations["failed_cases"] > 0].value_counts(sort=False)
         yield (
-            f"{count(failed)} candidates had cases that failed; each of these takes the worst rank. Most often, with "
-            f"{count(int(ends.max()))} candidates: {ends.idxmax()}."
+            f"{counted(failed, 'candidate')} had cases that failed; each of these takes the worst rank. Most often, "
+            f"with {counted(int(ends.max()), 'candidate')}: {ends.idxmax()}."
         )
     if tuned.plan["end"] in ("interrupted", UNFINISHED):
         how = "was interrupted" if tuned.plan["end"] == "interrupted" else "had not ended, or was killed,"
@@ -186,8 +187,8 @@ def _front_figure(tuned: Tuned) -> FigureBlock:
     drawing = front_figure(
         [tuned.label(name) for name in names],
         [
-            ("candidates outside a constraint", len(every) - feasible, shown[0]),
-            ("feasible candidates", feasible, shown[1]),
+            ("outside a constraint", len(every) - feasible, shown[0]),
+            ("feasible", feasible, shown[1]),
         ],
         tuned.best[names].to_numpy(),
         [(of_source(point["name"]), [point["values"][name] for name in names]) for point in tuned.plan["published"]],
@@ -196,7 +197,8 @@ def _front_figure(tuned: Tuned) -> FigureBlock:
     )
     beyond = candidates_beyond(drawing.plots[0])
     caption = "Every candidate and the front" if tuned.record.feasible else "Every candidate; none is feasible"
-    outside = f". {count(beyond)} candidates lie beyond the axes" if beyond else ""
+    lie = "lies" if beyond == 1 else "lie"
+    outside = f". {counted(beyond, 'candidate')} {lie} beyond the axes" if beyond else ""
     thinner = (
         f". At most {count(POINTS_SHOWN)} of each kind are drawn" if any(len(p) > POINTS_SHOWN for p in parts) else ""
     )

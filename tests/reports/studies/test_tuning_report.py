@@ -52,7 +52,8 @@ def test_the_front_is_drawn_with_every_candidate_and_the_published_points(record
     (front,) = marks_of(drawing, Points, "front")
     np.testing.assert_array_equal(np.column_stack([front.x, front.y]), record.front[["cost", "error"]])
     keys = [mark.key for mark in drawing.key]
-    assert sum(int(text.split()[0]) for text in keys if "candidates" in text and text[0].isdigit()) == 300
+    kinds = [text for text in keys if text.startswith(("feasible: ", "outside a constraint: "))]
+    assert sum(int(text.split()[-2]) for text in kinds) == 300
     assert {"Table 8 of the source", "Table 9 of the source"} <= set(keys)
     assert any("front: " in mark.key for mark in drawing.key)
     low, high = drawing.plots[0].x.reach
@@ -89,7 +90,7 @@ def test_infeasibility_is_stated_with_the_least_violation_and_never_hidden(infea
     assert infeasible.verdicts[0].tone == "bad"
     assert not infeasible.costs  # what a forbidden candidate reaches is no key result
     drawing = front_of(infeasible)
-    assert not any("feasible candidates" in mark.key for mark in drawing.key)
+    assert not any(mark.key.startswith("feasible") for mark in drawing.key)
     assert any("constraints are left out" in mark.key for mark in drawing.key)
     assert len(table(infeasible, "The least violation found").rows) == 1
     assert table(infeasible, "Published points").rows[0][-2].small == "outside a constraint"
@@ -113,6 +114,22 @@ def test_failed_cases_are_told(tmp_path):
         "90 candidates had cases that failed; each of these takes the worst rank. Most often, with 90 candidates: "
         "refused: too far.",
     )
+
+
+def test_one_candidate_is_counted_as_one(tmp_path):
+    found = build_tuning(synthetic_tuning(tmp_path / "out", n=10, failed=1), "out")
+    assert found.warnings[0].startswith("1 candidate had cases that failed; each of these takes the worst rank. Most")
+    assert "with 1 candidate: refused" in found.warnings[0]
+
+
+@pytest.mark.parametrize(("goal", "word"), [("minimise", "up"), ("maximise", "down")])
+def test_the_other_end_of_the_front_is_worse(record, goal, word):
+    plan = record.manifest["tuning"]
+    objectives = [{**objective, "goal": goal} for objective in plan["objectives"]]
+    found = build_tuning(
+        replace(record, manifest={**record.manifest, "tuning": {**plan, "objectives": objectives}}), "out"
+    )
+    assert f"; {word} to " in found.costs[0].detail
 
 
 def test_a_search_that_was_killed_is_reported_with_what_it_has(tmp_path):
