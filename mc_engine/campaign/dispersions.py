@@ -73,7 +73,8 @@ def _own_unit(section: DispersionSection, item: Parameter | Setting, findings: F
     if unit is not None and unit not in compatible(item.unit):
         quantity = UNITS[item.unit].quantity
         meaning = "plain numbers" if quantity == "number" else f"{quantity}"
-        findings.add("unit", f'"{unit}" is not a unit of {meaning}{hint(unit, compatible(item.unit))}')
+        absolute = "; spreads are absolute: convert a percentage of the nominal value" if unit == "%" else ""
+        findings.add("unit", f'"{unit}" is not a unit of {meaning}{hint(unit, compatible(item.unit))}{absolute}')
         unit = None
     if unit is not None:
         options = {key: _converted(key, value, unit, item.unit) for key, value in options.items()}

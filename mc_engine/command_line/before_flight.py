@@ -112,8 +112,31 @@ def _checked(file: str, process: "Process | None") -> "tuple[Campaign, Flyer, li
     problems = [] if process is None else flyer.faults()
     if process is not None and not problems:
         refuse_undeclared_data(campaign)
-        problems = flyer.faults_in_flight(process)
+        with _told_if_long(campaign):
+            problems = flyer.faults_in_flight(process)
     return campaign, flyer, problems
+
+
+_LONG = 30.0  # s
+
+
+@contextmanager
+def _told_if_long(campaign: "Campaign") -> Iterator[None]:
+    """A line on standard error where the nominal case takes long and nothing limits it: it may hang."""
+    from threading import Timer
+
+    text = (
+        f"the nominal case has not ended after {_LONG:g} s; Ctrl-C ends it, and `time_limit_s` of the simulator gives "
+        "up a case that takes longer"
+    )
+    timer = Timer(_LONG, typer.echo, (text,), {"err": True})
+    timer.daemon = True
+    if getattr(campaign.model, "time_limit_s", 0.0) is None:  # a simulator without a limit
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 @app.command()

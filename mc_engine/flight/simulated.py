@@ -137,12 +137,17 @@ class SimulatorFlyer(Flyer):
         if differing:
             lines = [f"not deterministic: {', '.join(differing)} differ between two flights of a case"]
             if self.simulator.deterministic:
-                lines[0] += "; `replay` will not find the same bits, say deterministic = false with a tolerance"
+                lines[0] += "; draw from case.rng or case.seed" if self.simulator.fly else "; seed it by {seed}"
+                lines[0] += ", or `replay` finds other bits; where they differ by rounding alone, set deterministic to "
+                lines[0] += "false, and a tolerance"
         still = [name for name in self._names if first[name] == dispersed[name]]
         if still and dispersed["status"] == first["status"] == STATUS_NAME[OK]:
             lines.append(f"the same in the nominal and in case 0: {', '.join(still)}; does an input move it?")
         if dispersed["status"] != STATUS_NAME[OK]:
             lines.append(f"case 0 ends as {dispersed['status']}: {dispersed['reason']}")
+        asked = self._campaign.retention
+        if not self.simulator.outputs and (asked.first or asked.cases or asked.worst_of):
+            lines.append("no time histories are saved, because the simulator declares no outputs")
         cores = os.cpu_count() or 1
         workers = min(cores, self.most_workers or cores)
         whole = seconds * self._campaign.cases / workers

@@ -246,8 +246,8 @@ class AdaptiveStep:
     rtol : float or str, error allowed in a step, as a fraction of the state's own size
     atol : float, or tuple with one for each state, error allowed in a step, in SI, beside rtol's.  It alone counts
         where a state passes through zero: far below what matters, as 1e-9 m in an orbit, it makes steps short there.
-    control_period : float, str or function of the settings, time [s] from one call of `control` to the next; steps end
-        there, but in phases without control
+    control_period : float, str or function of the settings, time [s] from one call of `control` to the next: at whole
+        multiples from t = 0, in phases with control alone, and steps end there.  A model with `control` needs it
     method : str, "dop853" (order 8) or "dp54" (order 5)
     attempts : int, a case that needs more steps, accepted and rejected ones together, ends as step-limit; at most 1e9
     first_step : float, length [s] of the first attempt; 0 chooses it

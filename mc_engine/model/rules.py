@@ -65,6 +65,10 @@ def refuse_contradictions(model: "Model") -> None:
         _refuse_event(event, model.switch is not None)
     settings, states = ([item.symbol for item in items] for items in (model.settings, model.states))
     _refuse_clock(model.clock, settings, states)
+    clock, controlled = model.clock, model.control is not None
+    if controlled and isinstance(clock, AdaptiveStep) and clock.control_period == inf:
+        raise ModelError("the model has `control`, but its clock no `control_period`: the only sample is at t = 0; "
+                         "write AdaptiveStep(..., control_period=0.1), the time [s] between samples")  # fmt: skip
 
 
 def refuse_false_simulator(simulator: "Simulator") -> None:

@@ -78,6 +78,9 @@ MISTAKES = [
     ('dist = "normal"\nsigma = 1\nupper = -50', "upper", "the bounds leave nothing of the distribution"),
     ('dist = "normal"\nsigma = 1\nunit = "kg"', "unit",
      '"kg" is not a unit of length; known are "m", "um", "mm", "cm", "km"'),
+    ('dist = "normal"\nsigma = 1\nunit = "%"', "unit",
+     '"%" is not a unit of length; known are "m", "um", "mm", "cm", "km"; spreads are absolute: convert a '
+     "percentage of the nominal value"),
     ('dist = "normal"\nsigma = 1\nunit = "Km"', "unit", '"Km" is not a unit of length; did you mean "km"?'),
     ('dist = "uniform"\nlower = 2', "", MIXTURE),
     ('dist = "uniform"\nhalf_range = 1\nupper = 2', "", MIXTURE),

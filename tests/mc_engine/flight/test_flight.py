@@ -180,11 +180,11 @@ def test_a_flight_has_a_billion_steps_at_most_which_is_enough_for_ten_days_of_a_
         grid_of(FixedStep(1e-3, 1.1e6), None)
     with pytest.raises(ModelError, match=r"`control_every` is 2\.7; it counts steps"):
         grid_of(FixedStep(1.0, 9.0, "every"), SimpleNamespace(every=2.7))
-    assert replace(model, clock=AdaptiveStep(day, attempts=10**9)).clock.attempts == 10**9
+    assert replace(model, clock=AdaptiveStep(day, attempts=10**9, control_period=1.0)).clock.attempts == 10**9
     with pytest.raises(
         ModelError, match=r"`attempts` is 1000000001; it must be a number at least 1, and 1,000,000,000"
     ):
-        replace(model, clock=AdaptiveStep(day, attempts=10**9 + 1))
+        replace(model, clock=AdaptiveStep(day, attempts=10**9 + 1, control_period=1.0))
 
 
 def test_another_clock_of_the_same_kind_flies_with_the_same_kernel(model):

@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mc_engine import CampaignError, StoreError, load_campaign, open_run, replay, resume, run
+from mc_engine.command_line import before_flight
 from mc_engine.command_line.commands import app
 from mc_engine.flight.simulated import about
 from mc_engine.runner import histories
@@ -54,6 +55,19 @@ def test_backends_and_more_cases_change_nothing(tmp_path, flown):
     store = run(campaign, tmp_path / "run", workers=2, backend=Backend("loky"), chunk=16)
     extend(store.path, 100, workers=1)
     assert open_run(tmp_path / "run").store.cases().equals(flown["case"].cases())
+
+
+def test_check_tells_what_a_simulator_lacks(tmp_path, monkeypatch):
+    fault = "import os, time\ntime.sleep(0.3)\ninputs['mass_kg'] *= 1.0 + int.from_bytes(os.urandom(1), 'big') / 256.0"
+    file = python_campaign(tmp_path / "ball", fault=fault)
+    source = file.with_name("sim.py")
+    source.write_text(source.read_text().replace('outputs=outputs(speed_m_s="speed"),', ""))
+    monkeypatch.setattr(before_flight, "_LONG", 0.1)
+    said = CliRunner().invoke(app, ["check", str(file)])
+    assert said.exit_code == 0
+    assert "has not ended after 0.1 s; Ctrl-C ends it, and `time_limit_s`" in said.stderr
+    assert "differ between two flights of a case; draw from case.rng or case.seed, or `replay` finds" in said.stdout
+    assert "no time histories are saved, because the simulator declares no outputs" in said.stdout
 
 
 def test_draws_of_a_case_are_its_own(tmp_path):
