@@ -75,7 +75,7 @@ class CampaignSection(Section):
         default=None, min_length=1, description='in place of a model: a module, or "sim.py" beside this file'
     )
     cases: int | None = Field(default=None, ge=1, le=MOST_CASES, description="number of cases; random designs only")
-    design: DesignName = Field(description="how the cases are laid out: mc, lhs, sobol, saltelli, grid, ...")
+    design: DesignName = Field(description="how the cases are laid out")
     seed: int | None = Field(
         default=None, ge=0, le=2**63 - 1, description="any whole number from 0 on; random designs only"
     )
@@ -116,8 +116,8 @@ class LevelsDispersion(DispersionSection):
 class NormalDispersion(DispersionSection):
     dist: Literal["normal"]
     mean: Number | None = Field(default=None, description="default: the nominal value")
-    sigma: Positive | None = None
-    three_sigma: Positive | None = None
+    sigma: Positive | None = Field(default=None, description="standard deviation, before any cut")
+    three_sigma: Positive | None = Field(default=None, description="three times that, in place of sigma")
     lower: Number | None = Field(default=None, description="cuts the distribution")
     upper: Number | None = Field(default=None, description="cuts the distribution")
 
@@ -127,9 +127,9 @@ class UniformDispersion(DispersionSection):
 
     dist: Literal["uniform"]
     mean: Number | None = Field(default=None, description="default: the nominal value")
-    half_range: Positive | None = None
-    lower: Number | None = None
-    upper: Number | None = None
+    half_range: Positive | None = Field(default=None, description="half of upper - lower")
+    lower: Number | None = Field(default=None, description="where the distribution begins")
+    upper: Number | None = Field(default=None, description="where the distribution ends")
 
 
 class TriangularDispersion(DispersionSection):
@@ -137,9 +137,9 @@ class TriangularDispersion(DispersionSection):
 
     dist: Literal["triangular"]
     mode: Number | None = Field(default=None, description="default: the nominal value")
-    half_range: Positive | None = None
-    lower: Number | None = None
-    upper: Number | None = None
+    half_range: Positive | None = Field(default=None, description="half of upper - lower")
+    lower: Number | None = Field(default=None, description="where the distribution begins")
+    upper: Number | None = Field(default=None, description="where the distribution ends")
 
 
 class LognormalDispersion(DispersionSection):
@@ -236,17 +236,19 @@ class RequirementSection(Section):
     """[requirement.NAME]: at_most, at_least or both, by `share` of the cases with `confidence`."""
 
     metric: str = Field(description="a metric of the model")
-    at_most: Number | None = None
-    at_least: Number | None = None
-    share: Share = 0.9973
-    confidence: Share = 0.90
+    at_most: Number | None = Field(default=None, description="upper limit of the metric")
+    at_least: Number | None = Field(default=None, description="lower limit of the metric")
+    share: Share = Field(default=0.9973, description="probability required of a case to keep the limits")
+    confidence: Share = Field(default=0.90, description="with which the cases must demonstrate it")
     source: Line = ""
     note: Note = ""
 
 
 class WorstSection(Section):
+    """[retention.histories] worst: a table in braces, or a list of them."""
+
     metric: str = Field(description="a metric of the model")
-    count: int = Field(default=5, ge=1, le=1000)
+    count: int = Field(default=5, ge=1, le=1000, description="how many of them")
     side: Literal["largest", "smallest"] | None = Field(
         default=None,
         description="by default those with the smallest margin to a limit; without a requirement, the largest",
@@ -260,10 +262,10 @@ Worst = Annotated[
 
 
 class HistoriesSection(Section):
-    """Which cases keep their flight history."""
+    """[retention.histories]: the cases whose time histories are saved."""
 
-    nominal: bool = True
-    first: int = Field(default=0, ge=0, le=100_000, description="the first cases")
+    nominal: bool = Field(default=True, description="the nominal case")
+    first: int = Field(default=0, ge=0, le=100_000, description="so many of the first cases")
     cases: list[Annotated[int, Field(ge=0)]] = Field(default_factory=list, description="these cases")
     rows: int = Field(default=1500, ge=10, le=1_000_000, description="about how many rows each history has")
     worst: Worst | None = Field(default=None, description="the worst cases of a metric")
@@ -275,7 +277,7 @@ class HistoriesSection(Section):
 
 
 class RetentionSection(Section):
-    """[retention]"""
+    """[retention]: what is saved besides the table of cases."""
 
     histories: HistoriesSection = Field(default_factory=HistoriesSection)
 
@@ -372,12 +374,12 @@ class CampaignFile(Section):
 
     campaign: CampaignSection = Field(description="the table [campaign] with model, design, ...")
     parameters: dict[str, Value] = Field(default_factory=dict, description="other nominal values and settings")
-    dispersion: dict[str, AnyDispersion] = Field(default_factory=dict)
-    correlation: list[CorrelationSection] = Field(default_factory=list)
-    covariance: dict[str, CovarianceSection] = Field(default_factory=dict)
+    dispersion: dict[str, AnyDispersion] = Field(default_factory=dict, description="spread of inputs, by parameter")
+    correlation: list[CorrelationSection] = Field(default_factory=list, description="pairs of dispersions")
+    covariance: dict[str, CovarianceSection] = Field(default_factory=dict, description="of orbit messages")
     inputs: InputsSection | None = Field(default=None, description="what is taken from another run, case by case")
-    requirement: dict[str, RequirementSection] = Field(default_factory=dict)
-    retention: RetentionSection = Field(default_factory=RetentionSection)
+    requirement: dict[str, RequirementSection] = Field(default_factory=dict, description="limits on metrics")
+    retention: RetentionSection = Field(default_factory=RetentionSection, description="saved time histories")
     sensitivity: SensitivitySection | None = Field(default=None, description="contributions of the inputs")
     simulator: SimulatorSection | None = Field(default=None, description="a program or FMU, in place of a model")
     report: ReportSection = Field(default_factory=ReportSection, description="probability and confidence of the report")

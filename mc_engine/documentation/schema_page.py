@@ -1,6 +1,7 @@
 """The reference of campaign-file keys, from the JSON schema of the file."""
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -29,7 +30,7 @@ def page() -> str:
 def _title(name: str) -> str:
     for ending, kind in (("Dispersion", "distribution "), ("Section", "section ")):
         if name.endswith(ending):
-            return kind + name.removesuffix(ending).lower()
+            return kind + re.sub("(?<=[a-z])(?=[A-Z])", " ", name.removesuffix(ending)).lower()
     return name
 
 

@@ -35,12 +35,12 @@ _OF_THE_RECORD = {"time_limit_s", "memory_limit_mib", "slots", "keep", "determin
 
 
 class NumberSection(Section):
-    """A number that goes in or comes out."""
+    """[simulator.output]: a column of the time history."""
 
     unit: str | None = Key(default=None, description="by default the one that the name ends in")
     description: str = ""
-    low: float | None = None
-    high: float | None = None
+    low: float | None = Key(default=None, description="smallest possible value; smaller inputs are refused")
+    high: float | None = Key(default=None, description="largest possible value; larger inputs are refused")
     variable: str | None = Key(default=None, min_length=1, description="variable of the FMU; default: its name")
 
 
@@ -81,7 +81,9 @@ class SimulatorSection(Section):
         default=None, gt=0.0, lt=1.0, description="relative, of the solver; default: that of the FMU, or 1e-8"
     )
     title: str = ""
-    input: dict[str, str] = Key(default_factory=lambda: {"case.json": JSON_INPUT}, description="files that it reads")
+    input: dict[str, str] = Key(
+        default_factory=lambda: {"case.json": JSON_INPUT}, description="files that it reads = their templates"
+    )
     result: str | None = Key(default=None, min_length=1, description="the file that it writes, .json or .csv")
     history: str | None = Key(default=None, min_length=1, description="a CSV, whose first column is the time t_s")
     echo: str | None = Key(default=None, min_length=1, description="path in the result of the inputs that it used")
@@ -91,10 +93,10 @@ class SimulatorSection(Section):
     time_limit_s: float | None = Key(default=None, gt=0.0, le=LONGEST_S, description="time of a case")
     memory_limit_mib: float | None = Key(default=None, gt=0.0, le=LARGEST_MIB, description="memory of a case")
     slots: int | None = Key(default=None, ge=1, le=100_000, description="cases that fly at a time, as licences allow")
-    keep: Literal["none", "failed", "all"] = Key(default="failed", description="whose folders are kept")
+    keep: Literal["none", "failed", "all"] = Key(default="failed", description="cases whose folders are kept")
     deterministic: bool = Key(default=True, description="replay compares bits; false: numbers within tolerance")
     tolerance: float = Key(default=0.0, ge=0.0, lt=1.0, description="fraction by which numbers may differ")
-    parameter: dict[str, ParameterSection] = Key(default_factory=dict)
+    parameter: dict[str, ParameterSection] = Key(default_factory=dict, description="its inputs, a table each")
     metric: dict[str, MetricSection] = Key(min_length=1, description="its results, a table each")
     output: dict[str, NumberSection] = Key(default_factory=dict, description="columns of its history")
 
