@@ -21,10 +21,11 @@ field, and in `Store.units`. The nominal case is kept apart, in `nominal.parquet
 |---|---|
 | `case_id` | number of the case, from 0 on; it never changes |
 | `status` | how the case ended, see below |
-| `reason` | one sentence where the inputs were refused |
+| `reason` | why a case failed, where more is known than its status |
 | dispersions | a column per dispersed parameter, under its name |
 | metrics | a column per metric of the model; not a number where the case failed |
-| `end_…` | the last state of the case, a column per state |
+| `end_time_s`, `end_…` | of a compiled model: the time and the last state of the case, a column per state |
+| `end_phase` | of a model with phases: the last phase |
 
 ## How a case ended
 
