@@ -211,8 +211,8 @@ def finish(
         analyses_line,
         case_line,
         failed_cases,
+        failure_line,
         nominal_line,
-        not_finite_line,
         outcomes,
         verdict_line,
     )
@@ -246,8 +246,8 @@ def finish(
         look = f"`mc-engine check {named}` looks for the reason in the model"
         why = "the column `reason` of its cases says why" if store.manifest.get("imported") else look
         typer.echo(f"no case completed; {why}", err=True)
-    elif line := not_finite_line(store):
-        typer.echo(f"not finite   {line}")
+    elif line := failure_line(store):
+        typer.echo(line)
     _judge_failures(failed, max_failed)
     if judge and any(verdict.outcome != "pass" for verdict in judged):
         leave(NOT_MET, "not every requirement is met")

@@ -29,13 +29,12 @@ def failed_cases(counts: Mapping[str, int]) -> int:
     return sum(count for word, count in counts.items() if word != STATUS_NAME[OK])
 
 
-def first_not_finite(store: Store) -> int | None:
-    """The first committed case with the status not-finite, or None."""
+def first_with(store: Store, status: str) -> int | None:
+    """The first committed case of a status, or None."""
     for part in store.parts:
-        if part.status.get(STATUS_NAME[NOT_FINITE]):
+        if part.status.get(status):
             table = read_part(store.path, part, CASE_COLUMNS[:2])
-            lost = rows_with(table["status"], STATUS_NAME[NOT_FINITE])
-            return int(numbers_in(table["case_id"])[lost][0])
+            return int(numbers_in(table["case_id"])[rows_with(table["status"], status)][0])
     return None
 
 
@@ -44,14 +43,21 @@ def is_compiled(store: Store) -> bool:
     return any(column.role == "state" for column in store.columns) and not store.manifest.get("imported")
 
 
-def not_finite_line(store: Store) -> str:
-    """Where to look for the cause of the first case that ended not-finite; empty if there is none."""
-    case = first_not_finite(store)
-    if case is None:
-        return ""
-    if is_compiled(store):
-        return f"`mc-engine replay {shell_word(store.path)} {case}` names the line of the model"
-    return f"case {case}: {store.row(case)['reason']}"
+def failure_line(store: Store) -> str:
+    """Why a case failed, the first that is not-finite or else of the most frequent status; empty if no row says why."""
+    counts, lost = store.status_counts(), STATUS_NAME[NOT_FINITE]
+    if counts.get(lost) and is_compiled(store):
+        named = f"`mc-engine replay {shell_word(store.path)} {first_with(store, lost)}`"
+        return f"not finite   {named} names the line of the model"
+    for status in sorted(counts, key=lambda word: (word != lost, -counts[word])):
+        case = first_with(store, status)
+        if status != STATUS_NAME[OK] and case is not None and (reason := store.row(case)["reason"]):
+            return (
+                f"not finite   case {case}: {reason}"
+                if status == lost
+                else f"failed       case {case}: {status}, {reason}"
+            )
+    return ""
 
 
 def case_line(store: Store) -> str:

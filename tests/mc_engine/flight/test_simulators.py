@@ -133,6 +133,12 @@ def test_the_command_line_says_of_simulators_what_is_true_of_them(tmp_path):
     assert "compile" not in said.output
 
 
+def test_a_run_with_failed_cases_says_why_the_first_of_them_failed(tmp_path):
+    file = python_campaign(tmp_path / "ball", cases=4, fault="if case.id > 1: raise ValueError('no air')")
+    said = CliRunner().invoke(app, ["run", str(file), "--out", str(tmp_path / "run"), "--no-report"]).output
+    assert "failed       case 2: crashed, sim.py, line 11: ValueError: no air\n" in said
+
+
 def test_a_changed_simulator_is_another_one(tmp_path):
     file = python_campaign(tmp_path / "a", cases=4)
     run(load_campaign(file), tmp_path / "run", workers=1)
