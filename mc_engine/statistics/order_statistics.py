@@ -88,11 +88,14 @@ def quantile(ordered: np.ndarray, probability: float, confidence: float = 0.90) 
     Returns a Quantile.  The estimate is approximately median-unbiased: Hyndman & Fan, Amer. Statist. 50 (1996),
     361-365, type 8.
 
-    Raises IndexError without a value.
+    Raises IndexError without a value, ValueError where the values do not ascend or are not numbers.
 
     >>> round(quantile(np.arange(1000.0), 0.99).value, 2)
     989.66
     """
+    ordered = np.asarray(ordered)
+    if not np.all(ordered[:-1] <= ordered[1:]) or np.isnan(ordered[-1:]).any():
+        raise ValueError("the values must ascend, without NaN; sort them, as by numpy.sort")
     return ranked_quantile(ordered.size, lambda rank: float(ordered[rank - 1]), probability, confidence)
 
 

@@ -42,3 +42,9 @@ def test_the_estimate_lies_between_its_limits_and_agrees_with_numpy(probability)
     limits = quantile(values, probability)
     assert limits.lower <= limits.value <= limits.upper
     assert limits.value == pytest.approx(np.quantile(values, probability, method="median_unbiased"), abs=1e-12)
+
+
+@pytest.mark.parametrize("values", [[3.0, 1.0, 2.0], [1.0, np.nan], [np.nan]])
+def test_values_in_no_order_have_no_quantile(values):
+    with pytest.raises(ValueError, match="the values must ascend, without NaN"):
+        quantile(values, 0.5)
