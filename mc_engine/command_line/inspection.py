@@ -37,7 +37,8 @@ def debug(
         typer.Option(
             metavar="NAME",
             help="Stop when this event happens: in switch, in the next rhs where the model has no switch, or in "
-            "observe where it ends the case. A delayed event happens at its crossing, and as NAME_due when it acts.",
+            "observe or evaluate where it ends the case. A delayed event happens at its crossing, and as NAME_due when "
+            "it acts.",
         ),
     ] = None,
     at_nan: Annotated[
