@@ -86,6 +86,7 @@ def report(
 def status(place: RunPlace) -> None:
     """How far a run is, and how its cases ended; of a tuning or a rare event, what was found."""
     from mc_engine.runner.summary import case_line
+    from mc_engine.store.case_rows import recorded_cases
     from mc_engine.store.run_files import RARE_EVENT, TUNING, kind_of
     from mc_engine.store.writer_lock import described, holder
     from mc_engine.studies.rare_event_folder import open_rare_event, rare_event_lines
@@ -117,7 +118,9 @@ def status(place: RunPlace) -> None:
         typer.echo(f"flying    by {described(writer)}")
     elif missing:
         resume = f"resume RUN --publish {shell_word(place)}" if is_url(place) else f"resume {shell_word(place)}"
-        typer.echo(f"missing   {ranges(missing)}; `mc-engine {resume}` flies them")
+        recorded = 0 if is_url(place) else recorded_cases(store.path)
+        flies = f"flies them but {recorded:,} whose rows are recorded" if recorded else "flies them"
+        typer.echo(f"missing   {ranges(missing)}; `mc-engine {resume}` {flies}")
     elif lost := store.lost_files():
         leave(DAMAGED, f"{place}/{lost[0]}: is gone; `mc-engine verify {shell_word(place)}` names all damage")
     else:

@@ -31,7 +31,7 @@ from mc_engine.runner.progress import ProgressCall
 from mc_engine.runner.summary import failed_cases
 from mc_engine.shell_words import shell_word
 from mc_engine.status import MOST_CASES, OK, STATUS_NAME
-from mc_engine.store.case_rows import remove_logs
+from mc_engine.store.case_rows import recorded_cases, remove_logs
 from mc_engine.store.opening import open_store
 from mc_engine.store.parts import Written, problem_of
 from mc_engine.store.repair import mend_journal, withdraw_damaged
@@ -231,7 +231,9 @@ def _run_tasks(
 def _interrupted(store: Store, without: str = "") -> RunInterrupted:
     done, total = sum(store.status_counts().values()), len(store.wanted)
     store.note("interrupted", cases=done)
-    return RunInterrupted(f"interrupted with {done:,} of {total:,} cases{without};")
+    recorded = recorded_cases(store.path)
+    more = f" and the rows of {recorded:,} more" if recorded else ""
+    return RunInterrupted(f"interrupted with {done:,} of {total:,} cases{more}{without};")
 
 
 def _fly_histories(store: Store, campaign: Campaign, session: Session, stopped: Callable[[], bool]) -> None:

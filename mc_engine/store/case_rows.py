@@ -87,6 +87,11 @@ class RowLog:
             disk.remove_file(self._run, self._name)
 
 
+def recorded_cases(run: Path) -> int:
+    """How many cases have a row that no part holds yet."""
+    return len(RowLog(run, 0, 2**62).rows())
+
+
 def remove_logs(run: Path) -> None:
     """Remove all logs of a run whose cases are complete, and their folder if nothing else is in it."""
     for name in _logs(run, NOMINAL_CASE, 2**62):

@@ -1,6 +1,8 @@
 """Simulators under a campaign file: each kind gives the same numbers, and keeps the promises of a run."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pandas as pd
@@ -137,6 +139,22 @@ def test_a_run_with_failed_cases_says_why_the_first_of_them_failed(tmp_path):
     file = python_campaign(tmp_path / "ball", cases=4, fault="if case.id > 1: raise ValueError('no air')")
     said = CliRunner().invoke(app, ["run", str(file), "--out", str(tmp_path / "run"), "--no-report"]).output
     assert "failed       case 2: crashed, sim.py, line 11: ValueError: no air\n" in said
+
+
+def test_an_interrupted_run_counts_the_cases_whose_rows_are_recorded(tmp_path):
+    fault = (
+        "import os, signal, time\nif case.id == 3: os.kill(int(os.environ['ENGINE']), signal.SIGINT); time.sleep(30)"
+    )
+    file = python_campaign(tmp_path / "ball", cases=6, fault=fault)
+    words = [sys.executable, "-m", "mc_engine"]
+    code = (
+        "import os, runpy; os.environ['ENGINE'] = str(os.getpid()); runpy.run_module('mc_engine', run_name='__main__')"
+    )
+    flight = [sys.executable, "-c", code, "run", file, "--workers", "1", "--no-report", "--out", tmp_path / "run"]
+    said = subprocess.run(flight, capture_output=True, text=True, timeout=60).stderr
+    assert "interrupted with 0 of 6 cases and the rows of 3 more; `mc-engine resume" in said
+    said = subprocess.run([*words, "status", tmp_path / "run"], capture_output=True, text=True, timeout=60).stdout
+    assert "flies them but 3 whose rows are recorded\n" in said
 
 
 def test_a_changed_simulator_is_another_one(tmp_path):
