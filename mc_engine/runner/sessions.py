@@ -65,10 +65,10 @@ def session_of(
     return Session(progress, workers, chunk, backend)
 
 
-def count_of(name: str, number: object) -> int:
-    """The argument of this name as Python's int, also of NumPy's; EngineError unless it is a whole number from 1 on."""
-    if isinstance(number, bool) or not (isinstance(number, Integral) and int(number) >= 1):
-        raise EngineError(f"{name}: {number!r} is not allowed; it must be a whole number from 1 on")
+def count_of(name: str, number: object, least: int = 1) -> int:
+    """The argument of this name as an int, also of NumPy's; EngineError unless it is a whole number from `least` on."""
+    if isinstance(number, bool) or not (isinstance(number, Integral) and int(number) >= least):
+        raise EngineError(f"{name}: {number!r} is not allowed; it must be a whole number from {least} on")
     return int(number)
 
 

@@ -100,6 +100,4 @@ class Selection:
     @property
     def values(self) -> dict[int, float]:
         """The value of every rank, once all passes are done."""
-        if not self.done:
-            raise ValueError("not all passes are done")
         return {rank: from_sortable(key) for rank, (key, _) in self.wanted.items()}

@@ -67,20 +67,8 @@ def stream(
         return 0.0
 
     judge_counted(counts, asked, design, looked)
-    digits = {column: digits[column].next(ranks) for column, ranks in wanted.items()}
     spreads = {name: Spread(tallies[name]) for name in used}
-    unsettled, second = [*wanted], True
-    while unsettled:
-        names = list(dict.fromkeys(column.metric for column in unsettled))
-        for part in passes(names):
-            finite = {name: finite_values(np.asarray(part[name], dtype=np.float64)) for name in names}
-            for column in unsettled:
-                digits[column].add(column.of(finite[column.metric]))
-            for name in names if second else ():
-                spreads[name].add(finite[name])
-        digits.update({column: digits[column].next() for column in unsettled})
-        unsettled, second = [column for column in unsettled if not digits[column].done], False
-    ranked = {column: selection.values for column, selection in digits.items()}
+    ranked = _ranked(passes, {column: digits[column].next(ranks) for column, ranks in wanted.items()}, spreads)
     summaries = {}
     for name, tally in tallies.items():
         if name not in spreads:
@@ -93,3 +81,21 @@ def stream(
     return Streamed(
         summaries, counts, *judge_counted(counts, lambda column, rank: ranked[column][rank], design, looked)
     )
+
+
+def _ranked(
+    passes: Passes, digits: dict[Judged, Selection], spreads: Mapping[str, Spread]
+) -> dict[Judged, dict[int, float]]:
+    """The wanted values by rank, in as many passes as they take; the first of these passes adds up the spreads too."""
+    unsettled, second = [*digits], True
+    while unsettled:
+        names = list(dict.fromkeys(column.metric for column in unsettled))
+        for part in passes(names):
+            finite = {name: finite_values(np.asarray(part[name], dtype=np.float64)) for name in names}
+            for column in unsettled:
+                digits[column].add(column.of(finite[column.metric]))
+            for name in names if second else ():
+                spreads[name].add(finite[name])
+        digits.update({column: digits[column].next() for column in unsettled})
+        unsettled, second = [column for column in unsettled if not digits[column].done], False
+    return {column: selection.values for column, selection in digits.items()}

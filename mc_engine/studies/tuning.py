@@ -4,7 +4,6 @@ A generation is flown as one table of cases; see `candidates`.  Every candidate 
 from all of them, not from the last generation alone.
 """
 
-import os
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -17,7 +16,7 @@ from mc_engine.campaign.tuning_section import Constraint, Objective, Tuning
 from mc_engine.errors import CampaignError, Problem, RunInterrupted
 from mc_engine.interruption import stop_signal
 from mc_engine.runner.manifest import manifest_of
-from mc_engine.runner.runner import ProgressCall
+from mc_engine.runner.sessions import ProgressCall, count_of, session_of
 from mc_engine.section import Section
 from mc_engine.store.parts import Column
 from mc_engine.store.result_folder import ColumnsAndArrays, write_result
@@ -68,8 +67,9 @@ def tune(
 
     Returns a TuningRecord.
 
-    Raises CampaignError without a [tuning], EngineError without pymoo, StoreError if `out` is occupied, and
-    RunInterrupted after the generation in which Ctrl-C was pressed; the generations completed by then are stored.
+    Raises CampaignError without a [tuning], EngineError without pymoo and for a number that no search can have,
+    StoreError if `out` is occupied, and RunInterrupted after the generation in which Ctrl-C was pressed; the
+    generations completed by then are stored.
 
     >>> record = tune(load_campaign("apogee.toml"), "runs/apogee", generations=2, population=4)
     >>> len(record.evaluations)
@@ -84,10 +84,12 @@ def tune(
         )
         raise CampaignError(campaign.name, [Problem("tuning", message)])
     path = default_folder(campaign.name) if out is None else path_of(out, "out: {} is no path")
+    session = session_of(progress, workers, None, "threading")
+    own_seed = campaign.seed % _SEED_RANGE if tuning.seed is None else tuning.seed
     plan: dict[str, Any] = {
-        "seed": (tuning.seed if tuning.seed is not None else campaign.seed % _SEED_RANGE) if seed is None else seed,
-        "population": population or tuning.population,
-        "generations": generations or tuning.generations,
+        "seed": own_seed if seed is None else count_of("seed", seed, 0),
+        "population": tuning.population if population is None else count_of("population", population, 4),
+        "generations": tuning.generations if generations is None else count_of("generations", generations),
         "patience": tuning.patience,
     }
     search = GeneticSearch(tuning, plan["population"], plan["seed"])  # says so if pymoo is not there
@@ -99,7 +101,7 @@ def tune(
         _write_tables(path, campaign, tuning, flown, {**manifest, "tuning": about}, lock)
 
     with writer_of_new(path, lambda: refuse_occupied(path)) as lock:
-        flown, end = _search(campaign, tuning, plan, search, workers or os.cpu_count() or 1, keep, progress)
+        flown, end = _search(campaign, tuning, plan, search, session.workers, keep, progress)
         keep(flown, end)
     if end == "interrupted":
         raise RunInterrupted(f"interrupted after {len(flown)} of {plan['generations']} generations; they are in {path}")

@@ -11,7 +11,7 @@ from apogee_tuning import CHOICE, apogee_and_speed, apogee_campaign
 
 from mc_engine import open_tuning, tune
 from mc_engine.campaign.search import SHIPPED
-from mc_engine.errors import RunInterrupted
+from mc_engine.errors import EngineError, RunInterrupted
 from mc_engine.studies.tuning import Generation, dominated_shares, is_stalled
 from mc_engine.studies.tuning_folder import infeasibility
 from tests.mc_engine.command_line.cart import call, fails_with
@@ -150,6 +150,14 @@ def test_ctrl_c_keeps_the_generations_flown(tmp_path):
     record = open_tuning(tmp_path / "out")
     assert record.manifest["tuning"]["end"] == "interrupted"
     assert len(record.evaluations) == 24
+
+
+@pytest.mark.parametrize("wrong", [{"population": 3}, {"generations": 0}, {"seed": "1"}, {"workers": -1}])
+def test_a_number_that_no_search_can_have_is_refused_before_anything_is_written(tmp_path, wrong):
+    ((name, value),) = wrong.items()
+    with pytest.raises(EngineError, match=f"{name}: {value!r} is not allowed; it must be a whole number from"):
+        tune(apogee_campaign(), tmp_path / "out", **wrong)
+    assert not (tmp_path / "out").exists()
 
 
 # ---- when to stop
