@@ -141,7 +141,7 @@ def verdict_line(verdict: "Verdict", units: Mapping[str, str]) -> str:
     asked = "all limits met"
     if verdict.metric:
         asked = f"{verdict.metric} {_limit_words(verdict)} {units.get(verdict.metric, '')}".rstrip()
-    because = f"; {verdict.failing_words}" if verdict.failing else ""
+    because = f"; {verdict.remark}" if verdict.remark else ""
     return f"{verdict.name}: {verdict.outcome}, {asked} {inside} ({required}){because}"
 
 

@@ -117,11 +117,15 @@ class Verdict:
     failing: tuple[str, ...] = ()
 
     @property
-    def failing_words(self) -> str:
-        """Such as "fuel fails with confidence shared"; empty without a requirement that fails the joint verdict."""
-        if not self.failing:
-            return ""
-        return f"{' and '.join(self.failing)} {'fails' if len(self.failing) == 1 else 'fail'} with confidence shared"
+    def remark(self) -> str:
+        """Why a joint verdict is another one than its own count gives; else empty."""
+        if self.failing:
+            verb = "fails" if len(self.failing) == 1 else "fail"
+            return f"{' and '.join(self.failing)} {verb} with confidence shared"
+        alone = not self.metric and self.outcome == NOT_DEMONSTRABLE
+        if alone and self.lower is not None and self.lower >= self.share:
+            return "not every requirement is demonstrated by itself"
+        return ""
 
     @property
     def margin(self) -> float | None:

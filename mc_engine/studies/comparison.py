@@ -346,7 +346,7 @@ def _note(name: str, verdict: Verdict | None, before: Verdict | None) -> str:
     if verdict is None or verdict.name != name:
         return f"{verdict.name} is the only requirement" if verdict else ""
     if before is None or not verdict.metric:
-        return verdict.failing_words
+        return verdict.remark
     if (before.metric, before.at_least, before.at_most) != (verdict.metric, verdict.at_least, verdict.at_most):
         return "the limit is different"
     asked, asks = (before.share, before.confidence), (verdict.share, verdict.confidence)

@@ -46,11 +46,10 @@ def _because(flown: Flown, verdict: Verdict) -> str:
             "no case was flown" if not verdict.tried else "the cases of this design are not a random sample"
         )
     if verdict.failing:
-        return f"{lost}; {verdict.failing_words}"
+        return f"{lost}; {verdict.remark}"
     if verdict.outcome == "fail":
         return f"{lost}; the true probability is at most {percent(verdict.upper, up=True)}"
-    alone = not verdict.metric and verdict.outcome != "pass" and verdict.lower >= verdict.share
-    but = ", but not every requirement is demonstrated by itself" if alone else ""
+    but = f", but {verdict.remark}" if verdict.remark else ""
     return f"{lost}; the true probability is at least {percent(verdict.lower)}{but}{_further(flown, verdict)}"
 
 

@@ -176,9 +176,9 @@ def test_a_joint_verdict_names_the_requirement_that_fails_it_alone():
     table = {"propellant_kg": fuel, "speed_m_s": np.full(2000, 6.0)}
     joint = judge_all([FUEL, {**SPEED, "share": 0.5}], table.__getitem__, np.ones(2000, dtype=bool))[1]
     assert (joint.outcome, joint.failing) == ("fail", ("fuel",))
-    assert joint.failing_words == "fuel fails with confidence shared"
+    assert joint.remark == "fuel fails with confidence shared"
     passing = both(np.full(5000, 0.5), np.full(5000, 6.0))[1]
-    assert (passing.outcome, passing.failing, passing.failing_words) == ("pass", (), "")
+    assert (passing.outcome, passing.failing, passing.remark) == ("pass", (), "")
 
 
 def test_the_joint_share_is_one_less_what_each_may_miss_and_its_confidence_the_smallest():

@@ -183,6 +183,7 @@ def test_a_joint_verdict_that_waits_for_a_requirement_alone_says_so():
         "but not every requirement is demonstrated by itself; 1\u202f104 cases without a further failure"
         in joint.detail
     )
+    assert verdict_line(built.joint, {}).endswith("confidence); not every requirement is demonstrated by itself")
     assert risk_table(built).rows[0][2].text == "too few cases"
 
 
