@@ -71,6 +71,8 @@ def read_case_table(path: Path, model: System, units: Mapping[str, str], finding
                 findings.add("", f'the column "{name}" is not a parameter of {model.name}{hint(name, items)}')
         except FileFault as fault:
             findings.add("", str(fault))
+            if name in items:  # the column is there; its cells are of no use
+                table[name] = np.full(len(cells), np.nan)
     if table and not len(next(iter(table.values()))):
         findings.add("", f'"{path.name}" has no rows below its first line')
     elif not table and not findings.problems:

@@ -59,6 +59,12 @@ def test_a_fault_in_the_table_is_refused_with_row_and_column(folder):
         assert problems("", "table", head=HEAD, directory=folder) == {"campaign.table": message}
 
 
+def test_a_column_with_a_wrong_cell_is_not_called_missing(folder):
+    (folder / "cases.csv").write_text(CSV.replace("1.5", "x"))
+    found = problems('[dispersion.speed_pct]\nsource = "radar"', "table", head=HEAD, directory=folder)
+    assert found == {"campaign.table": '"cases.csv", row 1, column "speed_pct": "x" is not a finite number'}
+
+
 def test_a_table_has_its_cases_in_order_and_may_go_to_the_ends_of_a_range(folder):
     head, *rows = CSV.replace("-2", "-100").splitlines()
     (folder / "cases.csv").write_text("\n".join([head, *rows]))
