@@ -272,7 +272,8 @@ def origin_sentence(origin: Origin, who: str = "") -> str:
     who : the case in words.
     """
     when = f"t = {origin.t:.6g} s" if math.isfinite(origin.t) else ""
-    happened = f"{_operation(origin)} ({', '.join(part for part in (when, who) if part)})"
+    which = ", ".join(part for part in (when, who) if part)
+    happened = f"{_operation(origin)} ({which})" if which else _operation(origin)
     if not origin.places:
         return happened
     ours = [place for place in origin.places if is_the_users(Path(place.file))] or [origin.places[-1]]

@@ -58,6 +58,12 @@ def line_of(folder, text, file="model.py"):
     return 1 + source[: source.index(text)].count("\n")
 
 
+def test_an_infinite_state_at_the_start_is_told_without_a_time(tmp_path):
+    edit = ("vx=dv * sin(p.pitch_error)", "vx=dv / sin(0.0 * p.pitch_error)")
+    (sentence,) = breaches(campaign_with(tmp_path, edit))
+    assert ': 100 / 0 is infinite; so `initial` gives inf for the state of "vx" at the start' in sentence
+
+
 def lost(campaign):
     """The sentence on the nominal case."""
     return first_lost(campaign.model, campaign.nominal, NOMINAL_NOISE, campaign.seed, "the nominal case")
