@@ -33,7 +33,7 @@ def resolve_beside(directory: Path, reference: str, owner: str = "the campaign f
         raise FileFault(f"{name} is no name that a file can have") from None
     if not path.is_relative_to(home):
         raise FileFault(f"{name} lies outside the folder of {owner}; put it beside {owner}")
-    if os.path.isabs(reference) or os.path.normpath(reference).startswith(".."):
+    if os.path.isabs(reference) or Path(os.path.normpath(reference)).parts[:1] == ("..",):
         here = json.dumps(path.relative_to(home).as_posix(), ensure_ascii=False)
         raise FileFault(f"{name} leads through other folders than that of {owner}; write {here}")
     if not is_file:

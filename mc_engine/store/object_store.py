@@ -322,7 +322,9 @@ def _reaching(url: str) -> Iterator[None]:
     except EngineError:
         raise
     except ImportError as error:
-        raise UsageError(f"{url}: needs a package: {error}; {how_to_install('cloud')}") from error
+        ours = url.startswith("s3") or "fsspec" in str(error)  # of other stores fsspec names the package itself
+        how = f"; {how_to_install('cloud')}" if ours else ""
+        raise UsageError(f"{url}: needs a package: {error}{how}") from error
     except TimeoutError as error:
         raise StoreError(f"{url}: the store has not answered in time") from error
     except Exception as error:  # each store's package has its own errors

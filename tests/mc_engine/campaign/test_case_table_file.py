@@ -87,6 +87,7 @@ def test_a_table_where_none_belongs_or_none_is_there_is_refused(folder):
         ("mc", HEAD + "cases = 3\nseed = 1\n", "", "campaign.table", 'the design "mc" reads no table'),
         ("table", HEAD.replace("cases.csv", "../x.csv"), "", "campaign.table", '"../x.csv" lies outside the folder'),
         ("table", HEAD.replace("cases.csv", "x.csv"), "", "campaign.table", 'there is no file "x.csv"'),
+        ("table", HEAD.replace("cases.csv", "..x.csv"), "", "campaign.table", 'there is no file "..x.csv"'),
         ("table", HEAD + "cases = 2\n", "", "campaign.cases", '2 is not allowed; the design "table" has 3 cases'),
         ("table", HEAD, "[dispersion.mass_kg]", "dispersion.mass_kg", "the table has no such column"),
         ("table", HEAD, "[dispersion.height_km]\nhalf_range = 2", "dispersion.height_km.half_range", "the design"),

@@ -1,5 +1,7 @@
 """URLs of object stores: what is incomplete is refused before anything is flown, and nothing secret is said."""
 
+import sys
+
 import pytest
 from small_run import created, filled
 
@@ -103,3 +105,10 @@ def test_credentials_in_a_url_are_refused_and_never_said(here, text):
     with pytest.raises(CampaignError) as caught:
         load_campaign(text)
     assert "hid" not in str(caught.value)
+
+
+def test_the_package_that_a_store_needs_is_the_only_one_that_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "gcsfs", None)  # as where it is not installed
+    with pytest.raises(EngineError, match=r"gs://bucket/x: needs a package: .*gcsfs") as refusal:
+        fetch("gs://bucket/x", tmp_path / "run")
+    assert "s3fs" not in str(refusal.value)
