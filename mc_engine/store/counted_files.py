@@ -165,12 +165,15 @@ class CountedFiles:
         return b"", why
 
     def _unrecorded(self, state: _State) -> Iterator[tuple[str, str]]:
-        try:
-            for name in self._present():
+        for entry in names_in(self.root):
+            try:
+                names = list(self._files_at(entry))
+            except StoreError as error:  # a folder that is a symbolic link; what follows it is read all the same
+                yield self._name_and_problem(error)
+                continue
+            for name in names:
                 if not is_temporary(name.rpartition("/")[2]) and name not in state.receipts:
                     yield name, f"does not count, {self.journal} does not name it"
-        except StoreError as error:  # a folder that is a symbolic link
-            yield self._name_and_problem(error)
 
     def _name_and_problem(self, error: StoreError) -> tuple[str, str]:
         """An error that begins with a path in the directory, as the file's name and the problem."""
@@ -179,11 +182,15 @@ class CountedFiles:
 
     def _present(self) -> Iterator[str]:
         """Names of all files in the folders, and of those in the directory that have a name of such a file."""
-        for name in names_in(self.root):
-            if name in self.folders:
-                yield from (f"{name}/{inner}" for inner in names_in(self.root, name))
-            elif self._is_name(_final(name)):
-                yield name
+        for entry in names_in(self.root):
+            yield from self._files_at(entry)
+
+    def _files_at(self, entry: str) -> Iterator[str]:
+        """Of one entry of the directory: all files in it where it is one of the folders, or its own name."""
+        if entry in self.folders:
+            yield from (f"{entry}/{inner}" for inner in names_in(self.root, entry))
+        elif self._is_name(_final(entry)):
+            yield entry
 
     # ---- writing
 

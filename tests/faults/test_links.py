@@ -149,6 +149,16 @@ def failed(tmp_path_factory):
     return runner.run(load_campaign(file), folder / "run", workers=1).path
 
 
+def test_a_folder_that_is_a_link_hides_no_other_damage(tmp_path):
+    run = a_run(tmp_path)
+    for folder in ("replay", "report-figures"):
+        (run / folder).rename(tmp_path / folder)
+        (run / folder).symlink_to(tmp_path / folder)
+    (run / "footprint.kml").write_bytes(b"not recorded")
+    said = {line.partition(": ")[0] for line in damage(run) if "symbolic link" in line or "does not count" in line}
+    assert {"replay", "report-figures", "footprint.kml"} <= said
+
+
 @pytest.mark.parametrize(
     "name",
     ["simulator", pytest.param("simulator/case-0000003", marks=pytest.mark.slow), "simulator/case-0000003/case.json"],
