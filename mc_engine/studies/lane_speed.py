@@ -214,6 +214,8 @@ def _in_numbers(clock: Clock, settings: Any) -> Clock:
         n_steps, step, every = flight.grid_of(clock, settings)
         return replace(clock, step=step, until=n_steps * step, control_every=every)
     until, rtol, period = (clock_number(item, settings) for item in (clock.until, clock.rtol, clock.control_period))
+    if period == np.inf != clock.control_period:  # what the settings give; no model with control is declared with it
+        period = 2.0 * until  # nor is there a second sample with this
     return replace(clock, until=until, rtol=rtol, control_period=period)
 
 

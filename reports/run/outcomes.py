@@ -1,6 +1,6 @@
 """How each case came out: inside all limits, outside one of them, or failed.
 
-Every count of cases in a report comes from `statistics.requirements.inside_all`, over the table at hand by `inside`,
+Every count of cases in a report comes from `statistics.limits.inside_all`, over the table at hand by `inside`,
 over all cases by `HeldCases.limit_counts`; its words come from `inside_words`: a figure or table over some of the
 requirements never says "all limits".
 """

@@ -16,7 +16,8 @@ from mc_engine.campaign.search import SHIPPED
 from mc_engine.command_line.commands import app
 from mc_engine.flight.flight import bound_flight, fly
 from mc_engine.model import AdaptiveStep, FixedStep
-from mc_engine.studies.lane_speed import MethodTiming, Timing, _first_within, _Trials, compare_methods
+from mc_engine.studies.lane_speed import MethodTiming, Timing, _first_within, _in_numbers, _Trials, compare_methods
+from tests.mc_engine.lanes.models import long_coast
 
 
 @pytest.fixture(scope="module")
@@ -240,3 +241,9 @@ def test_samples_of_the_control_stay_where_they_are():
     assert [step * every for step, every in grids] == pytest.approx([0.5] * len(grids))
     trials._scales = np.array([2.0])
     assert trials._adaptive("dop853", 1e-3) == AdaptiveStep(30.0, 1e-3, (2e-3,), 0.5, "dop853")
+
+
+def test_a_control_that_the_settings_leave_but_its_first_sample_is_flown_by_other_clocks():
+    clock = replace(long_coast.MODEL.clock, control_period=lambda _: np.inf)
+    numbers = _in_numbers(clock, None)
+    assert replace(long_coast.MODEL, clock=numbers).clock.control_period > clock.until
