@@ -53,7 +53,8 @@ class Backend:
         for limit in ("case_seconds", "memory_mib", "patience_s"):
             value = getattr(self, limit)
             is_number = isinstance(value, Real) and not isinstance(value, bool)
-            if value is not None and not (is_number and 0 < value <= sys.float_info.max):
+            exact = float(value) if isinstance(value, np.floating) else value  # to float32 the largest is inf
+            if value is not None and not (is_number and 0 < exact <= sys.float_info.max):
                 raise EngineError(f"{limit}: {value!r} is not allowed; it must be a finite number above 0")
         limited = self.case_seconds is not None or self.memory_mib is not None
         if limited and (flown_by := {"threading": "a thread", "cuda": "a card", "auto": "a card"}.get(self.name)):

@@ -162,6 +162,7 @@ def test_a_shard_is_no_run_to_extend_or_to_take_inputs_from(campaign, tmp_path):
         (("loky", None, "3"), "case_seconds: '3' is not allowed; it must be a finite number above 0"),
         (("loky", None, True), "case_seconds: True is not allowed; it must be a finite number above 0"),
         (("loky", None, 10**400), "0 is not allowed; it must be a finite number above 0"),
+        (("loky", None, np.float32("inf")), "inf. is not allowed; it must be a finite number above 0"),
         (("loky", None, None, -512), "memory_mib: -512 is not allowed"),
         (("dask", None, None, None, float("nan")), "patience_s: nan is not allowed"),
         (("dask", 8786), "--scheduler 8786: .*; write an address such as tcp://node1:8786"),
