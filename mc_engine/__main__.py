@@ -17,7 +17,9 @@ def _refuse_lost_folder() -> None:
 def _refuse_build_time() -> None:
     """End the process where NumPy cannot read the build time, which the import of SciPy makes it do."""
     build_time = os.environ.get("SOURCE_DATE_EPOCH", "0")
-    if not build_time.isdecimal():
+    try:
+        int(build_time)
+    except ValueError:
         print(f"SOURCE_DATE_EPOCH: {build_time!a} is no whole number of seconds; correct or unset it", file=sys.stderr)
         sys.exit(2)  # wrong usage
 

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from hashlib import sha256
+from math import inf
 from numbers import Real
 from pathlib import Path
 
@@ -52,9 +53,7 @@ class Backend:
             raise EngineError(f'a scheduler is for the backend "dask", not for "{self.name}"')
         for limit in ("case_seconds", "memory_mib", "patience_s"):
             value = getattr(self, limit)
-            is_number = isinstance(value, Real) and not isinstance(value, bool)
-            exact = float(value) if isinstance(value, np.floating) else value  # to float32 the largest is inf
-            if value is not None and not (is_number and 0 < exact <= sys.float_info.max):
+            if value is not None and not _is_limit(value):
                 raise EngineError(f"{limit}: {value!r} is not allowed; it must be a finite number above 0")
         limited = self.case_seconds is not None or self.memory_mib is not None
         if limited and (flown_by := {"threading": "a thread", "cuda": "a card", "auto": "a card"}.get(self.name)):
@@ -112,6 +111,14 @@ def flyer_on(backend: str, campaign: Campaign) -> Flyer:
 
         return CardFlyer(campaign)
     return flyer_of(campaign)
+
+
+def _is_limit(value: object) -> bool:
+    """Whether it is a number above 0 that a float can hold."""
+    try:
+        return isinstance(value, Real) and not isinstance(value, bool) and 0.0 < float(value) < inf
+    except OverflowError:
+        return False
 
 
 def memory_can_be_limited() -> bool:

@@ -45,13 +45,14 @@ def is_compiled(store: Store) -> bool:
 
 def failure_line(store: Store) -> str:
     """Why a case failed, the first that is not-finite or else of the most frequent status; empty if no row says why."""
-    counts, lost = store.status_counts(), STATUS_NAME[NOT_FINITE]
+    lost = STATUS_NAME[NOT_FINITE]
+    counts = {word: count for word, count in store.status_counts().items() if word != STATUS_NAME[OK]}
     if counts.get(lost) and is_compiled(store):
         named = f"`mc-engine replay {shell_word(store.path)} {first_with(store, lost)}`"
         return f"not finite   {named} names the line of the model"
     for status in sorted(counts, key=lambda word: (word != lost, -counts[word])):
         case = first_with(store, status)
-        if status != STATUS_NAME[OK] and case is not None and (reason := store.row(case)["reason"]):
+        if case is not None and (reason := store.row(case)["reason"]):
             return (
                 f"not finite   case {case}: {reason}"
                 if status == lost

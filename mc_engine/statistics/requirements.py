@@ -214,9 +214,12 @@ def _joined(joint: Verdict, tests: Sequence[Verdict], further: ShareLimits) -> V
         return replace(joint, outcome=FAIL, needed=None, failing=() if joint.outcome == FAIL else failing)
     if all(test.outcome == PASS for test in tests):
         return replace(joint, outcome=PASS, needed=None)
-    refuted = any(test.outcome == FAIL for test in tests)
-    needed = [further.smallest_sample(test.share, test.confidence, test.tried - test.passed) for test in tests]
-    return replace(joint, outcome=NOT_DEMONSTRABLE, needed=None if refuted or not joint.random else max(needed))
+    if not joint.random or any(test.outcome == FAIL for test in tests):
+        return replace(joint, outcome=NOT_DEMONSTRABLE, needed=None)
+    needed = [
+        test.needed or further.smallest_sample(test.share, test.confidence, test.tried - test.passed) for test in tests
+    ]
+    return replace(joint, outcome=NOT_DEMONSTRABLE, needed=max(needed))
 
 
 def joint_share(shares: Sequence[float]) -> float | None:

@@ -39,7 +39,7 @@ def history_envelopes(histories: pd.DataFrame, case_ids: Sequence[int], names: S
 
     Between its own rows a flight is a straight line; after its end it counts no more.  Where so few still fly that they
     do not support the outer percentiles, these end, and the median where fewer than FEWEST_CASES do; smallest and
-    largest go on to the end of the longest flight, and are those of all rows, also between the instants.
+    largest go on to the end of the longest flight, and reach the peaks between the instants.
     """
     if len(case_ids) < FEWEST_CASES:
         return {}
@@ -78,19 +78,30 @@ def _envelope(grid: np.ndarray, times: list[np.ndarray], values: list[np.ndarray
         enough = (flying >= FEWEST_CASES) & (flying * min(probability, 1.0 - probability) >= 1.0)
         supported = enough | (probability in (0.0, 1.0))
         curves[probability] = np.where(supported, below + (place - low) * (above - below), np.nan)
-    _reach(curves[0.0], np.fmin, grid, times, values)
-    _reach(curves[1.0], np.fmax, grid, times, values)
+    _reach_peaks(curves, rows, grid, times, values)
     return Envelope(grid, curves, len(times))
 
 
-def _reach(
-    curve: np.ndarray, extreme: np.ufunc, grid: np.ndarray, times: list[np.ndarray], values: list[np.ndarray]
+def _reach_peaks(
+    curves: dict[float, np.ndarray],
+    rows: np.ndarray,
+    grid: np.ndarray,
+    times: list[np.ndarray],
+    values: list[np.ndarray],
 ) -> None:
-    """Extend a curve of extremes to the rows of the flights between the instants, each at the instant next to it.
+    """Let the curves of the extremes reach the peaks of flights between two instants, each at the nearer one.
 
-    A peak that is narrower than the instants are apart would be cut off.
+    A peak is a row of a flight beyond its values at both instants, `rows`; it would be cut off.
     """
-    rows = np.concatenate(values)
-    nearest = np.searchsorted(0.5 * (grid[1:] + grid[:-1]), np.concatenate(times))
-    kept = np.isfinite(rows) & np.isfinite(curve[nearest])
-    extreme.at(curve, nearest[kept], rows[kept])
+    t, y = np.concatenate(times), np.concatenate(values)
+    flight = np.repeat(np.arange(len(times)), [one.size for one in times])
+    left = np.clip(np.searchsorted(grid, t, "right") - 1, 0, grid.size - 2)
+    before, after = rows[flight, left], rows[flight, left + 1]
+    nearest = left + ((2.0 * t > grid[left] + grid[left + 1]) & np.isfinite(after))
+    for probability, extreme, peak in (
+        (0.0, np.fmin, y < np.fmin(before, after)),
+        (1.0, np.fmax, y > np.fmax(before, after)),
+    ):
+        curve = curves[probability]
+        kept = peak & np.isfinite(y) & np.isfinite(curve[nearest])
+        extreme.at(curve, nearest[kept], y[kept])
