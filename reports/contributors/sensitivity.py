@@ -8,6 +8,7 @@ import numpy as np
 from mc_engine.statistics.drivers import FALSE_DISCOVERIES, Driver, Drivers, failure_drivers, success_along
 from reports.contributors.companion import companion_blocks, no_contributors
 from reports.contributors.designed_indices import designed_blocks
+from reports.contributors.single_changes import single_change_blocks
 from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.drawing.marks import Drawing
 from reports.figures.statistics import success_panel
@@ -35,6 +36,9 @@ def sensitivity_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
         return
     if flown.design in ("saltelli", "morris"):
         yield from designed_blocks(flown, inputs)
+        return
+    if flown.design == "one_at_a_time":
+        yield from single_change_blocks(flown)
         return
     if not flown.random:
         yield (

@@ -145,6 +145,27 @@ def level_panel(label: str, levels: Sequence[str], quantiles: np.ndarray, used: 
     return Plot(tuple(marks), Axis(log=log), names_axis(levels, down=True), title, 40.0 + 26.0 * len(levels))
 
 
+def single_change_panel(label: str, names: Sequence[str], changes: Sequence[tuple[Sequence[str], np.ndarray]]) -> Plot:
+    """Bars from the lowest to the highest change of a metric by each input, with a sign for each level.
+
+    label : of the change.  changes : by input, its levels in words and the change at each, float64[n_levels].
+    """
+    place = np.arange(len(names), dtype=np.float64)
+    low, high = np.array([(np.nanmin([0.0, *row]), np.nanmax([0.0, *row])) for _, row in changes]).T
+    marks: list[Mark] = [Bar(low, high, place - 0.3, place + 0.3, SKY, 0.9)]
+    texts = [
+        f"{name} {level}: {number(float(change), 4)}"
+        for name, (levels, row) in zip(names, changes, strict=True)
+        for level, change in zip(levels, row, strict=True)
+    ]
+    at, every = np.concatenate([row for _, row in changes]), np.repeat(place, [row.size for _, row in changes])
+    known = np.flatnonzero(np.isfinite(at)).tolist()
+    key = "one level of the input"
+    marks.append(Points(at[known], every[known], BLUE, key, size=6.0, texts=[texts[k] for k in known], key=key))
+    marks.append(Limit(0.0, "x", INK, "all inputs nominal", "dash", 1.0, key="all inputs nominal"))
+    return Plot(tuple(marks), Axis(label), names_axis(names, down=True), "", 44.0 + 22.0 * len(names))
+
+
 def tornado(metric: str, names: Sequence[str], total: np.ndarray, first: np.ndarray, interval: str) -> Plot:
     """Bars of total effects, those of first effects beside them; float64[n, 3]: value and both ends of its interval."""
     marks: list[Mark] = []

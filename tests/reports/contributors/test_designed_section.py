@@ -73,3 +73,39 @@ def test_cases_of_a_block_at_one_place_count_once_in_a_map():
     flown = Flown(SyntheticRun(run.manifest, table, run.nominal_row, run.history), "run")
     (drawn, *_) = [block.drawing.alternative for block in map_blocks(flown) if isinstance(block, FigureBlock)]
     assert "nearest of 120 of 600 cases" in drawn
+
+
+def one_at_a_time():
+    """Cases 1 to 3 change ve alone, 4 and 5 oe alone; case 3 has no number."""
+    made = synthetic_run(6, failed=0)
+    ve, oe = np.array([0.0, -10.0, 20.0, 30.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 0.0, -5.0, 5.0])
+    table = made.table.assign(ve_pct=ve, oe_pct=oe, **fly(ve, oe))
+    table.loc[3, "status"] = "not-finite"
+    table["entry_speed_m_s"] = 7000.0 + ve - 3.0 * np.abs(oe)
+    manifest = {**made.manifest, "campaign": {**made.manifest["campaign"], "design": "one_at_a_time"}}
+    return SyntheticRun(manifest, table, {**made.nominal_row, "ve_pct": 0.0, "oe_pct": 0.0}, made.history)
+
+
+def test_one_at_a_time_tells_what_each_input_does_alone():
+    run = one_at_a_time()
+    run.manifest["requirements"] = [
+        {"name": metric, "metric": metric, "at_least": 0.0, "share": 0.9, "confidence": 0.9}
+        for metric in ("entry_speed_m_s", "pulse_count")
+    ]
+    run.table["pulse_count"] = 4.0
+    figure, table, same = section(run)
+    assert isinstance(figure, FigureBlock)
+    assert same.paragraphs == ("No input alone changes pulse count.",)
+    rows = [row for row in table.rows if row[0].text == "entry speed [m/s]"]
+    said = [tuple((cell.text, cell.small.replace("\u202f", " ")) for cell in row[1:]) for row in rows]
+    assert said == [
+        (("ve", ""), ("−10", "at −10 %"), ("20", "at 20 %"), ("2/3", "")),
+        (("oe", ""), ("−15", "at −5 %"), ("0", ""), ("2/2", "")),
+    ]
+
+
+def test_one_at_a_time_without_a_nominal_number_has_no_changes():
+    run = one_at_a_time()
+    run.table.loc[0, "status"] = "not-finite"
+    (words,) = section(run)
+    assert words.paragraphs[0].startswith("Changes of propellant, ")

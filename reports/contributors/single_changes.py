@@ -1,0 +1,125 @@
+"""What each input does alone, in a run of design one_at_a_time: changes from the case with all inputs nominal."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from reports.document.blocks import Cell, Column, FigureBlock, Table
+from reports.drawing.marks import Drawing, Plot
+from reports.figures.rows import single_change_panel
+from reports.run.flown import Flown
+from reports.text.numbers import axis_label, count, exact, number, with_unit
+
+MOST_METRICS = 8
+MOST_INPUTS = 12  # of a metric
+_NOTE = (
+    "Each change is that of one case, in which this input alone is not nominal, from the case in which all are; it is "
+    "0 where no level moves the metric that way. Changes may be added up only where inputs do not act together; where "
+    "the model draws noise, they include its scatter."
+)
+
+
+@dataclass(frozen=True)
+class SingleChanges:
+    """One input: its levels in words, and by how much each moves a metric, float64[n_levels], NaN without a number."""
+
+    name: str
+    levels: tuple[str, ...]
+    change: np.ndarray
+
+    @property
+    def size(self) -> float:
+        return max(self.fall[0], self.rise[0], key=abs)
+
+    @property
+    def fall(self) -> tuple[float, str]:
+        """The largest change downwards, at most 0, and its level."""
+        return self._furthest(-1.0)
+
+    @property
+    def rise(self) -> tuple[float, str]:
+        """The largest change upwards, at least 0, and its level."""
+        return self._furthest(1.0)
+
+    def _furthest(self, sign: float) -> tuple[float, str]:
+        place = int(np.argmax(np.nan_to_num(sign * self.change, nan=-np.inf)))
+        change = float(self.change[place])
+        return (change, self.levels[place]) if sign * change > 0.0 else (0.0, "")
+
+
+def single_change_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
+    """A figure and a table of the metrics that matter; a sentence for those of which nothing is known."""
+    cases = _cases_by_input(flown)
+    found = {metric: _changes(flown, metric, cases) for metric in flown.key_metrics[:MOST_METRICS]}
+    told = {metric: changes for metric, changes in found.items() if any(row.size for row in changes)}
+    if told:
+        panels = tuple(_panel(flown, metric, changes) for metric, changes in told.items())
+        caption = "Change of each metric by one input alone, from the case with all inputs nominal."
+        yield FigureBlock(caption, Drawing("Changes by one input alone", panels), "half")
+        yield _table(flown, told)
+    same = [metric for metric, changes in found.items() if changes and metric not in told]
+    if same:
+        yield f"No input alone changes {flown.listed(same)}."
+    unknown = [metric for metric, changes in found.items() if not changes]
+    if unknown:
+        yield (
+            f"Changes of {flown.listed(unknown)} are not known: there is no number where all inputs are nominal, or "
+            "none where one is not."
+        )
+
+
+def _cases_by_input(flown: Flown) -> dict[str, np.ndarray]:
+    """Rows of the table by the one input that is not nominal; those with all inputs nominal under ""."""
+    changed = np.array([values != flown.nominal.get(name) for name, values in flown.inputs.items()])
+    rows = {"": np.flatnonzero(~changed.any(axis=0))}
+    for name, differs in zip(flown.inputs, changed, strict=True):
+        rows[name] = np.flatnonzero(differs)
+    return {name: found for name, found in rows.items() if found.size}
+
+
+def _changes(flown: Flown, metric: str, cases: dict[str, np.ndarray]) -> list[SingleChanges]:
+    """What each input does to a metric, the largest change first; nothing without a number to change from."""
+    values = flown.values(metric)
+    nominal = values[cases[""][:1]] if "" in cases else np.full(1, np.nan)
+    rows = []
+    for name, places in cases.items():
+        change = values[places] - nominal
+        if name and np.isfinite(change).any():
+            levels = [flown.inputs[name].tolist()[place] for place in places.tolist()]
+            rows.append(SingleChanges(name, tuple(_in_words(level, flown.unit(name)) for level in levels), change))
+    return sorted(rows, key=lambda row: -abs(row.size))
+
+
+def _in_words(level: float | bool | str, unit: str) -> str:
+    return exact(level) if isinstance(level, bool | str) else with_unit(number(level), unit)
+
+
+def _panel(flown: Flown, metric: str, changes: list[SingleChanges]) -> Plot:
+    shown = changes[:MOST_INPUTS]
+    label = axis_label(f"change of {flown.words(metric)}", flown.unit(metric))
+    return single_change_panel(
+        label, [flown.words(row.name) for row in shown], [(row.levels, row.change) for row in shown]
+    )
+
+
+def _table(flown: Flown, told: dict[str, list[SingleChanges]]) -> Table:
+    columns = (
+        Column("Metric", "text", grouped=True),
+        Column("Input", "text"),
+        Column("Largest fall", "number"),
+        Column("Largest rise", "number"),
+        Column("Used / tried", "number"),
+    )
+    rows, left_out = [], 0
+    for metric, changes in told.items():
+        title = Cell(axis_label(flown.words(metric), flown.unit(metric)))
+        left_out += len(changes[MOST_INPUTS:])
+        for row in changes[:MOST_INPUTS]:
+            used = f"{count(int(np.isfinite(row.change).sum()))}/{count(row.change.size)}"
+            ends = [
+                Cell(number(change, 4), change, f"at {level}" * bool(level)) for change, level in (row.fall, row.rise)
+            ]
+            rows.append((title, Cell(flown.words(row.name)), *ends, Cell(used)))
+    note = _NOTE + f" {count(left_out)} smaller ones are not shown." * bool(left_out)
+    return Table("Changes of the metrics by one input alone", columns, tuple(rows), note)
