@@ -50,10 +50,10 @@ def test_a_spread_below_a_ten_millionth_of_the_value_is_named_and_not_drawn():
 
 
 def test_a_zero_but_for_rounding_is_no_key_result_and_not_drawn():
-    """The crossrange of a planar flight: its 1e-28 km were a card on the first page, a scatter plot and a history."""
+    """The crossrange of a planar flight: its 1e-17 km were a card on the first page, a scatter plot and a history."""
     run = synthetic_run(400, failed=0)
     names = ("downrange_km", "crossrange_km")
-    for name, size in zip(names, (1.0, 1e-30), strict=True):
+    for name, size in zip(names, (1.0, 1e-19), strict=True):
         run.table[name], run.history[name] = size * run.table["max_position_error_m"], size * run.history["force_n"]
         run.manifest["columns"].append({"name": name, "unit": "km", "role": "metric", "description": ""})
     run.manifest["figures"] = [to_record(ScatterFigure(*names, "End")), to_record(HistoryFigure(names, "Way"))]
