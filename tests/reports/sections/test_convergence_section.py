@@ -80,6 +80,9 @@ def test_a_metric_that_is_rounding_beside_others_in_its_unit_has_no_error_of_int
     flown = Flown(run, "run")
     assert flown.integration_share("correction_impulse_m_s") is None
     assert flown.integration_share("entry_speed_m_s") > 0.0
+    run.table["exit_speed_m_s"] = 1e30  # a mark of what never happens: it hid the warning of coarse steps
+    run.manifest["columns"].append({"name": "exit_speed_m_s", "unit": "m/s", "role": "metric", "description": ""})
+    assert Flown(run, "run").integration_share("entry_speed_m_s") > 0.0
 
 
 def test_a_probability_beside_one_has_no_digits_of_rounding(monkeypatch):
