@@ -52,6 +52,7 @@ _FUNCTIONS = {"sqrt": "the square root", "log": "the logarithm", "asin": "the ar
 _ENGINE = Path(__file__).resolve().parents[1]
 _PYTHON = Path(sysconfig.get_path("stdlib")).resolve()
 _OF_0_1 = "a model of version 0.1 is written so; CHANGELOG.md says under 0.2.0 how to convert it"
+_SAID_OF_0_1 = {"Field": "positional", "Parameter": "multiple values", "Setting": "multiple values"}  # by Python
 _LONG = 60  # characters of a source line in a sentence
 
 
@@ -208,7 +209,7 @@ def wrong_record(error: BaseException) -> str:
     wrong = re.search("unexpected keyword argument '(\\w+)'", call[2])
     near = nearest(wrong[1], known) if wrong else None
     meant = f'; did you mean "{near}"?' if near else ""
-    old = f"; {_OF_0_1}" if call[1] == "Field" and "positional" in call[2] else ""
+    old = f"; {_OF_0_1}" if _SAID_OF_0_1.get(call[1], "\n") in call[2] else ""
     return f"{call[1]}: {call[2]}{meant}; it takes {', '.join(known)}{old}"
 
 
