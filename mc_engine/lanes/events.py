@@ -2,9 +2,10 @@
 
 A step that oversteps an event is taken again from its start with a shorter length, found by a bracketed
 secant search (Illinois rule) on the event function itself, so an event is as exact as the integrator.  The
-side that has crossed is kept: an event never fires twice on one crossing.  Only the signs at both ends of a step
+side that has crossed is kept: an event never fires twice on one crossing.  Here only the signs at both ends of a step
 tell of an event: a function that crosses twice within one step, or again in what its own event leaves of a step, is
-not seen, so the step must be shorter than the time between two events of one kind.
+not seen, so the step must be shorter than the time between two events of one kind.  Adaptive steps (`adaptive_flight`)
+also end where the function turns.
 
 M. Dowell, P. Jarratt, "A modified regula falsi method", BIT 11 (1971) 168-174.
 """
