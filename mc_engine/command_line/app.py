@@ -1,8 +1,9 @@
 """The application of the command line, and what its commands share: exit statuses, arguments, checks of paths.
 
-Exit status: 0 done, 1 a requirement is not met (`run --judge`), 2 wrong usage or campaign, 3 more failed cases than
-allowed (`run --max-failed`), 4 interrupted or disk full, and resumable, 5 directory damaged or busy, or object store
-out of reach, 6 unexpected error or too little memory, with a log file.
+Exit status: 0 done, 1 a requirement is not met (`run --judge`) or something has changed (`compare`), 2 wrong usage or
+campaign, 3 more failed cases than allowed (`run --max-failed`), 4 interrupted or disk full, and resumable, 5 directory
+damaged or busy, a replay that differs, or object store out of reach, 6 unexpected error or too little memory, with a
+log file.
 """
 
 import errno
@@ -57,9 +58,9 @@ def _converted(kind: Any, value: Any, param: Any, ctx: Any) -> Any:
 app = typer.Typer(
     cls=_Commands,
     help="Monte Carlo dispersion campaigns for spacecraft guidance, navigation and control.",
-    epilog="Exit status: 0 done, 1 a requirement not met, 2 wrong usage or campaign, 3 too many failed cases, "
-    "4 interrupted or disk full, 5 damaged or busy directory, or object store out of reach, 6 unforeseen error or too "
-    "little memory.",
+    epilog="Exit status: 0 done, 1 a requirement not met or a change found, 2 wrong usage or campaign, 3 too many "
+    "failed cases, 4 interrupted or disk full, 5 damaged or busy directory, or object store out of reach, 6 unforeseen "
+    "error or too little memory.",
     no_args_is_help=True,
     rich_markup_mode=None,  # plain help: importing rich takes longer than all the rest
     pretty_exceptions_enable=False,
