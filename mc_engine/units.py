@@ -1,6 +1,6 @@
 """Units of columns and their factors to SI; the suffix that a column name carries for each unit."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from math import pi
 from typing import TypeVar
@@ -165,8 +165,10 @@ def compatible(unit: str) -> list[str]:
     return [name for name, other in UNITS.items() if other.quantity == UNITS[unit].quantity]
 
 
-def unit_of(name: str) -> str:
+def unit_of(name: str, said: Callable[[str], str] = 'unit="{}"'.format) -> str:
     """The unit at the end of a column's name; ModelError where there is none, or where it may be two.
+
+    said : what a user writes to say a unit.
 
     >>> unit_of("burn_dv_m_s"), unit_of("heat_load_mj_m2")
     ('m/s', 'MJ/m^2')
@@ -175,10 +177,12 @@ def unit_of(name: str) -> str:
     if len(units) == 1:
         return units[0]
     if units:
-        raise ModelError(f'"{name}" may end in the unit {" or ".join(units)}; say which, unit="{units[0]}"')
+        raise ModelError(f'"{name}" may end in the unit {" or ".join(units)}; say which, {said(units[0])}')
     alike = _alike(name)
     ending = f'; did you mean "{alike}"?' if alike else ""
-    raise ModelError(f'"{name}" ends in no unit{ending}; say unit="" for a plain number; `mc-engine units` lists all')
+    raise ModelError(
+        f'"{name}" ends in no unit{ending}; say {said("")} for a plain number; `mc-engine units` lists all'
+    )
 
 
 def units_meant(name: str) -> list[str]:

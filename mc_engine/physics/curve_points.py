@@ -18,11 +18,14 @@ LARGEST = 1e300  # of the arguments
 NARROWEST = 1e-300  # range of the arguments
 
 
-def columns_of(path: Path, wanted: Mapping[str, str | None]) -> dict[str, np.ndarray]:
+def columns_of(
+    path: Path, wanted: Mapping[str, str | None], said: Mapping[str, Callable[[str], str]]
+) -> dict[str, np.ndarray]:
     """float64[n_rows], SI, of each wanted column.
 
     wanted : names of columns, each with its unit, or with None: then the end of its name says it, such as _km_s, and a
         single word, such as mach, is a plain number.
+    said : by column, what a user writes to say a unit.
     Raises ModelError where the file, a column, a unit or a number is missing; FileNotFoundError as `open` does.
     """
     columns = _parquet(path) if path.suffix == ".parquet" else _csv(path)
@@ -30,15 +33,16 @@ def columns_of(path: Path, wanted: Mapping[str, str | None]) -> dict[str, np.nda
         if name not in columns:
             raise ModelError(f'{path.name} has no column "{name}"{hint(name, columns)}')
     try:
-        return {name: columns[name] * si_factor(name, unit) for name, unit in wanted.items()}
+        return {name: columns[name] * si_factor(name, unit, said[name]) for name, unit in wanted.items()}
     except ModelError as error:
         raise ModelError(f"{path.name}: {error}") from None
 
 
-def si_factor(name: str, unit: str | None = None) -> float:
+def si_factor(name: str, unit: str | None = None, said: Callable[[str], str] = str) -> float:
     """SI value of one unit of a column.
 
     unit : by default what the name ends in; the longest ending counts.  A single word, such as mach, has none.
+    said : what a user writes to say a unit.
     Raises ModelError where `unit` is none, and where a name of several words ends in none or in what may be two.
     """
     if unit is not None:
@@ -48,7 +52,7 @@ def si_factor(name: str, unit: str | None = None) -> float:
     if name.isalnum():  # mach, cd
         return 1.0
     factors = {UNITS[meant].factor for meant in units_meant(name)}
-    return factors.pop() if len(factors) == 1 else UNITS[unit_of(name)].factor
+    return factors.pop() if len(factors) == 1 else UNITS[unit_of(name, said)].factor
 
 
 def _csv(path: Path) -> dict[str, np.ndarray]:

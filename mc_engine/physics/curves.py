@@ -11,6 +11,7 @@ on both sides of an argument (see `_axis`).  An argument that is not a number gi
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +95,8 @@ def curve(
     _refuse_unknown(outside, OUTSIDE, "outside")
     path = path_beside_caller(file) if file is not None else None
     if path is not None:
-        read = columns_of(path, {str(x): x_unit, str(y): y_unit})
+        said = {str(x): 'x_unit="{}"'.format, str(y): 'y_unit="{}"'.format}
+        read = columns_of(path, {str(x): x_unit, str(y): y_unit}, said)
         xs, ys = read[str(x)], read[str(y)]
     else:
         xs, ys = array_of(x, "x", x_unit), array_of(y, "y", y_unit)
@@ -126,7 +128,8 @@ def wind_profile(
     wanted = [name for name in (altitude, north, east, speed, coming_from) if name]
     if len(wanted) != 3 or bool(north) != bool(east):
         raise ModelError("a wind has the columns north and east, or speed and coming_from")
-    h, *pair = (columns_of(path, dict.fromkeys(wanted))[name] for name in wanted)
+    by_name = dict.fromkeys(wanted, lambda unit: "by another name")
+    h, *pair = (columns_of(path, dict.fromkeys(wanted), by_name)[name] for name in wanted)
     components = pair if north else [-pair[0] * np.cos(pair[1]), -pair[0] * np.sin(pair[1])]
     to_north, to_east = (_through(h, component, kind, outside, path) for component in components)
 
@@ -167,7 +170,8 @@ def surface(
         raise ModelError(f'{words}: units has "{name}", which is none of its numbers')
     if path is not None:
         names = [str(x), str(y), str(z)]
-        read = columns_of(path, {name: given.get(name) for name in names})
+        said = {name: partial(_in_units, name) for name in names}
+        read = columns_of(path, {name: given.get(name) for name in names}, said)
         xs, ys, zs = grid_of(words, *(read[name] for name in names))
     else:
         xs, ys = array_of(x, "x", given.get("x")), array_of(y, "y", given.get("y"))
@@ -181,6 +185,10 @@ def surface(
     cells = finite_rows(words, _CELLS[kind], xs, ys, zs)
     block = DataBlock(np.concatenate([first, second, [cells.shape[1], 0.0, 0.0, 0.0], cells.ravel()]), path)
     return Curve(_bounded_surface(_ON[kind], block, outside), block, words, kind, outside)
+
+
+def _in_units(name: str, unit: str) -> str:
+    return f'units={{"{name}": "{unit}"}}'
 
 
 # ---- points and the buckets that they are found by

@@ -14,7 +14,7 @@ from scipy.interpolate import PchipInterpolator, RegularGridInterpolator, interp
 from mc_engine.errors import ModelError
 from mc_engine.physics import curves
 from mc_engine.physics.curve_points import si_factor
-from mc_engine.physics.curves import curve, surface
+from mc_engine.physics.curves import curve, surface, wind_profile
 
 RNG = np.random.default_rng(11)
 N = 100_000
@@ -304,3 +304,15 @@ def test_a_column_whose_unit_is_not_known_is_no_plain_number(folder):
         with pytest.raises(ModelError, match=f"points.csv: .*{sentence}"):
             curve("points.csv", x="time_s", y=name)
         assert curve("points.csv", x="time_s", y=name, y_unit="kN")(1.0) == 2000.0
+
+
+def test_the_argument_that_says_a_unit_is_named_as_the_function_has_it(folder):
+    (folder / "points.csv").write_text("time_sec,alpha_x,cd\n0,0,1\n0,1,2\n1,0,1\n1,1,2\n")
+    with pytest.raises(ModelError, match=r'; say x_unit="" for a plain number'):
+        curve("points.csv", x="time_sec", y="cd")
+    with pytest.raises(ModelError, match=r'; say y_unit="" for a plain number'):
+        curve("points.csv", x="cd", y="time_sec")
+    with pytest.raises(ModelError, match=r'; say units=\{"alpha_x": ""\} for a plain number'):
+        surface("points.csv", "time_sec", "alpha_x", "cd", units={"time_sec": "s"})
+    with pytest.raises(ModelError, match="; say by another name for a plain number"):
+        wind_profile("points.csv", "time_sec", "alpha_x", "cd")
