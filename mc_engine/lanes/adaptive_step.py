@@ -165,10 +165,13 @@ def is_lost(kind, value):
 
 @physics
 def arm(kind, sense0, value0, sense1, value1, best, h):
-    """1 where a crossing counts; a peak counts if its top, bounded by the tangents, may beat the best so far."""
+    """1 where a crossing counts; a peak counts if its top may beat the best so far.
+
+    Where the tangents meet within the step they bound the top; elsewhere the hill is not bent one way: nothing does.
+    """
     hill = (sense0 > 0.0) & (sense1 < 0.0)
     x = (value1 - value0 - sense1 * h) / where(hill, sense0 - sense1, 1.0)
-    promising = hill & (value0 + sense0 * x > best)
+    promising = hill & ((value0 + sense0 * x > best) | (x < 0.0) | (x > h))
     return where(kind == PEAK, where(promising, 1.0, 0.0), where(kind == CORNER, 0.0, 1.0))
 
 

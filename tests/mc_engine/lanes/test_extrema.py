@@ -5,7 +5,8 @@ import pytest
 from flown_models import CORNERS, FOLDER, OSCILLATOR, flown, inputs_of
 
 from mc_engine.flight.flight import fly_history
-from mc_engine.lanes.extrema import crest, crest_time, crest_value
+from mc_engine.lanes.adaptive_step import arm
+from mc_engine.lanes.extrema import PEAK, crest, crest_time, crest_value
 
 RANDOM = np.random.default_rng(5)
 AMPLITUDE, PHASE, RATE = RANDOM.uniform(0.5, 2.0, 60), RANDOM.uniform(0.2, 6.0, 60), RANDOM.uniform(0.3, 2.0, 60)
@@ -96,3 +97,11 @@ def test_the_crest_of_three_points_of_a_parabola_is_exact_however_short_the_last
     assert crest_value(0.0, 0.0, *values, *times, 1.0, True) == pytest.approx(5.0, rel=1e-15)
     found = crest_time(0.0, 0.0, *values, *times, 1.0, True)
     assert found == pytest.approx(1.0 + 0.25 * last_step, abs=max(1e-7 * last_step, 1e-15 / last_step))
+
+
+def test_a_top_late_in_a_step_that_begins_flat_may_beat_the_best_so_far():
+    # t^4 (5 - 4 t) + t / 1000 tops 1 between 0 and 1.1, where its tangents meet behind the step
+    end, rate = 1.1**4 * 0.6 + 1.1e-3, -2.0 * 1.1**3 + 1e-3
+    assert arm(PEAK, 1e-3, 0.0, rate, end, 0.9, 1.1) == 1.0
+    # t (1 - t) between 0 and 1: they meet at 0.5, and bound its top of 0.25
+    assert [float(arm(PEAK, 1.0, 0.0, -1.0, 0.0, best, 1.0)) for best in (0.49, 0.51)] == [1.0, 0.0]
