@@ -83,6 +83,7 @@ def timeline_table(flown: Flown) -> Table | None:
         is_event = words.endswith(" time") or fact.description.startswith(EVENTS)
         if value is not None and _is_time(flown.own.unit(fact.name)) and is_event:
             times[fact.name] = words.removesuffix(" time")
+    events = {*times.values()}
     at_start = [times.pop(name) for name in [*times] if _seconds(flown, name) == 0.0]
     phases = phase_times(flown)
     if not times and not phases:
@@ -99,7 +100,7 @@ def timeline_table(flown: Flown) -> Table | None:
                     _seconds(flown, name),
                 ),
                 Cell(spread, summary.sd),
-                Cell("; ".join(_at_event(flown, name, event)) or "–"),
+                Cell("; ".join(_at_event(flown, name, event, events)) or "–"),
             )
         )
     rows.sort(key=lambda row: row[1].value or 0.0)
@@ -137,13 +138,19 @@ def _seconds(flown: Flown, name: str) -> float:
     return convert(float(flown.own.nominal_value(name) or 0.0), flown.own.unit(name), "s")
 
 
-def _at_event(flown: Flown, name: str, event: str) -> Iterator[str]:
-    """What else the metrics tell of an event: those whose names begin like that of its time."""
-    stem = f"{event.replace(' ', '_')}_"
+def _at_event(flown: Flown, name: str, event: str, events: set[str]) -> Iterator[str]:
+    """What else the metrics tell of an event: those whose names begin like that of its time, and of no longer one."""
+    stem = _stem(event)
+    longer = tuple(_stem(other) for other in events if len(other) > len(event))
     told = 0
     for fact in flown.with_role("metric"):
         value = flown.nominal_value(fact.name)
-        if fact.name.startswith(stem) and fact.name != name and value is not None and told < AT_EVENT:
+        mine = fact.name.startswith(stem) and not fact.name.startswith(longer) and fact.name != name
+        if mine and value is not None and told < AT_EVENT:
             told += 1
             words = flown.words(fact.name).removeprefix(event).strip() or event
             yield f"{words} {with_unit(number(value, 4), flown.unit(fact.name))}"
+
+
+def _stem(event: str) -> str:
+    return f"{event.replace(' ', '_')}_"

@@ -31,6 +31,21 @@ def test_the_timeline_tells_when_and_what_else_is_known_of_the_event():
     assert table.rows[0][3].text == "altitude 41.5\u202fkm"
 
 
+def test_what_is_known_of_an_event_is_not_told_of_another_whose_name_is_the_beginning_of_its_own():
+    run = synthetic_run(50, failed=0)
+    told = {"exit_time_s": 20.0, "exit_speed_m_s": 90.0, "exit_burn_time_s": 80.0, "exit_burn_size_m_s": 3.0}
+    run.manifest["columns"] += [
+        {"name": name, "unit": "s" if name.endswith("time_s") else "m/s", "role": "metric", "description": "x"}
+        for name in told
+    ]
+    run.table = run.table.assign(**told)
+    run.nominal_row |= told
+    table = next(one for one in section(run, "scenario").blocks if isinstance(one, Table))
+    rows = {row[0].text: row[3].text for row in table.rows}
+    assert rows["Exit"] == "speed 90\u202fm/s"
+    assert rows["Exit burn"] == "size 3\u202fm/s"
+
+
 def test_a_time_whose_meaning_is_the_end_of_a_phase_is_an_event():
     run = synthetic_run(50, failed=0)
     run.manifest["columns"] += [
