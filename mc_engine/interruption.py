@@ -1,6 +1,7 @@
 """Interruption by Ctrl-C or SIGTERM.
 
-While cases fly, the first signal lets the chunks in flight complete, and the second one stops at once.  At any other
+While cases fly, the first signal lets the chunks in flight complete, or gives up cases in flight that may take long,
+and the second one stops at once.  At any other
 time the first signal ends the command, and the second one the process.  The exit status is INTERRUPTED, and the message
 names the command that continues.  This module imports very little, so that the command line can install its handlers
 before it loads the rest.
@@ -35,6 +36,7 @@ _MODEL_FAULT = 2  # the exit status of a faulty model
 NOTHING_BEGUN = "interrupted; nothing was begun, give the same command again"
 ONCE_MORE = "interrupted; the same command begins again from the start"
 COMPLETING = "interrupted; the cases in flight are completed first, a second signal stops at once"
+GIVING_UP = "interrupted; the cases in flight are given up, a second signal stops at once"
 
 _LOOK_EVERY_S = 0.2
 _ONE_SIGNAL_S = 0.05  # signals closer than this are one: `timeout` signals a process and then its group
@@ -219,8 +221,8 @@ def raise_if_signalled() -> None:
 
 
 @contextmanager
-def stop_signal() -> Iterator[threading.Event]:
-    """An event that the first SIGINT or SIGTERM sets; a second one raises KeyboardInterrupt.
+def stop_signal(message: str = COMPLETING) -> Iterator[threading.Event]:
+    """An event that the first SIGINT or SIGTERM sets, with a message; a second one raises KeyboardInterrupt.
 
     Outside the main thread, where Python handles no signals, the event is never set.
     """
@@ -237,7 +239,7 @@ def stop_signal() -> Iterator[threading.Event]:
             raise Interrupted
         stop.set()
         if _COMMAND_LINE.installed:
-            _write_error(COMPLETING)
+            _write_error(message)
 
     before: dict[int, Any] = {number: signal.signal(number, set_stop) for number in SIGNALS}
     if _COMMAND_LINE.signals:  # one that came before the event existed

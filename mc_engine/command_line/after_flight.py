@@ -86,7 +86,7 @@ def report(
 def status(place: RunPlace) -> None:
     """How far a run is, and how its cases ended; of a tuning or a rare event, what was found."""
     from mc_engine.runner.summary import case_line
-    from mc_engine.store.case_rows import recorded_cases
+    from mc_engine.store.case_rows import recorded_cases, rows_so_far
     from mc_engine.store.run_files import RARE_EVENT, TUNING, kind_of
     from mc_engine.store.writer_lock import described, holder
     from mc_engine.studies.rare_event_folder import open_rare_event, rare_event_lines
@@ -115,7 +115,8 @@ def status(place: RunPlace) -> None:
     writer = holder(folder)
     missing = store.missing()
     if writer is not None:
-        typer.echo(f"flying    by {described(writer)}")
+        rows, _ = rows_so_far(store.path)
+        typer.echo(f"flying    by {described(writer)}{f', {rows:,} further cases are complete' if rows else ''}")
     elif missing:
         resume = f"resume RUN --publish {shell_word(place)}" if is_url(place) else f"resume {shell_word(place)}"
         recorded = 0 if is_url(place) else recorded_cases(store.path)

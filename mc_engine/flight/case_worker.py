@@ -28,13 +28,7 @@ from mc_engine.flight.program_flight import Flown, ProgramFlight, flown, in_time
 from mc_engine.model.faults import fault_of
 from mc_engine.model.simulator import Refuse, Simulator, load_simulator
 from mc_engine.model.sources import leave_importable
-from mc_engine.process_tree import (
-    adopt_orphans,
-    die_with_parent,
-    end_children,
-    let_forks_be_terminated,
-    own_children,
-)
+from mc_engine.process_tree import adopt_orphans, die_with_parent, end_children, let_forks_be_terminated, own_children
 from mc_engine.sampling.streams import stream
 from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, NOT_FINITE, OK, REFUSED
 from mc_engine.store.case_rows import MOST_KEPT, RowLog, keep_case
@@ -243,8 +237,8 @@ def _read(simulator: Simulator, given: Any, history: bool) -> Flown:
             raise ValueError(f'"{metric.name}" is {value}, which is no number') from None
     if lost := simulator.lost_metric(values):
         return flown(NOT_FINITE, lost)
-    past = _history(simulator, table)
-    return flown(OK, "", values, past if history else None)
+    past, left_out = _history(simulator, table)
+    return flown(OK, "", values, past if history else None)._replace(left_out=left_out)
 
 
 def _read_batch(simulator: Simulator, given: Any, order: Order) -> tuple[dict[str, np.ndarray], Flown]:
@@ -259,8 +253,8 @@ def _read_batch(simulator: Simulator, given: Any, order: Order) -> tuple[dict[st
         if column.shape != order.noise.shape:
             raise ValueError(f'"{metric.name}" has the shape {column.shape}; it must be {order.noise.shape}')
         arrays[metric.name] = column
-    past = _history(simulator, table)
-    return arrays, flown(OK, "", history=past if order.history else None)
+    past, left_out = _history(simulator, table)
+    return arrays, flown(OK, "", history=past if order.history else None)._replace(left_out=left_out)
 
 
 def _parts(simulator: Simulator, given: Any) -> tuple[Mapping[str, Any], Any]:
@@ -276,15 +270,17 @@ def _parts(simulator: Simulator, given: Any) -> tuple[Mapping[str, Any], Any]:
     return metrics, table
 
 
-def _history(simulator: Simulator, table: Any) -> dict[str, np.ndarray]:
-    """The history of a case by column; ValueError with a sentence if it is not there."""
-    if not simulator.outputs or table is None:
-        return {}
+def _history(simulator: Simulator, table: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    """(history of a case by column, names of columns that are no outputs); ValueError with a sentence without it."""
+    wanted = ("t_s", *(output.name for output in simulator.outputs))
     known = table if isinstance(table, Mapping) else getattr(table, "columns", None)
+    left_out = tuple(clean(str(name)) for name in (() if known is None else known) if name not in wanted)
+    if not simulator.outputs or table is None:
+        return {}, left_out
     if known is None:
         raise ValueError(f"the history is a {type(table).__name__}; it must be a DataFrame")
     columns = {}
-    for name in ("t_s", *(output.name for output in simulator.outputs)):
+    for name in wanted:
         if name not in known:
             raise ValueError(f'the history has no column "{name}"')
         try:
@@ -293,7 +289,7 @@ def _history(simulator: Simulator, table: Any) -> dict[str, np.ndarray]:
             raise ValueError(f'the column "{name}" of the history is no numbers') from None
     if len(counts := {np.size(column): None for column in columns.values()}) > 1:
         raise ValueError(f"columns of the history have {' and '.join(map(str, counts))} rows")
-    return in_time(columns)
+    return in_time(columns), left_out
 
 
 def folder_name(noise: int) -> str:

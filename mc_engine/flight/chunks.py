@@ -25,13 +25,13 @@ from mc_engine.store.case_rows import Row, RowLog
 from mc_engine.store.parts import CASE_COLUMNS, Column, Part, Written, read_part, revised_name, write_aside
 from mc_engine.store.run_files import NOMINAL_CASE
 
-SMALLEST_CHUNK, LARGEST_CHUNK = 64, Flyer.largest_chunk
+LARGEST_CHUNK = Flyer.largest_chunk
 Guard = Callable[[np.ndarray], AbstractContextManager[Any]]
 
 
 def chunk_size(cases: int, workers: int, flyer: Flyer | type[Flyer] = Flyer) -> int:
     """How many cases a worker flies at a time, and a part holds, by default."""
-    return min(max(-(-cases // (flyer.chunks_per_worker * workers)), SMALLEST_CHUNK), flyer.largest_chunk)
+    return min(max(-(-cases // (flyer.chunks_per_worker * workers)), flyer.smallest_chunk), flyer.largest_chunk)
 
 
 def chunks_of(ranges: Iterable[tuple[int, int]], size: int) -> Iterator[tuple[int, int]]:

@@ -44,7 +44,9 @@ class CompiledFlyer(Flyer):
             self._model, inputs, noise, self._seed, folder=self._folder, width=self._width, build=self._build
         )
 
-    def histories(self, inputs: Inputs, noise: np.ndarray, rows: int) -> Iterator[tuple[Columns, Columns]]:
+    def histories(
+        self, inputs: Inputs, noise: np.ndarray, rows: int, stopped: Callable[[], bool] = never
+    ) -> Iterator[tuple[Columns, Columns]]:
         return flight.fly_histories(self._model, inputs, noise, self._seed, folder=self._folder, rows=rows)
 
     def digest(self) -> str:

@@ -38,7 +38,8 @@ class Flyer(ABC):
     batch : cases that fly together, of which one may end the worker of all.
     histories_together : cases whose histories fly together.
     chunks_per_worker : in a run, at least: enough for an even end, few enough that parts stay large.
-    largest_chunk : cases that a worker flies at a time, at most, since all their numbers are in memory.
+    smallest_chunk : cases that a worker flies at a time, at least.
+    largest_chunk : at most, since all their numbers are in memory.
     keeps_rows : a case may take long, so the row of each is recorded when it is complete, and a run that is stopped
         does not wait for the cases in flight.
     most_workers : that may fly cases of this campaign at a time, as licences allow; None for any number.
@@ -48,6 +49,7 @@ class Flyer(ABC):
     batch: int
     histories_together: int = 1
     chunks_per_worker: int = 8
+    smallest_chunk: int = 64
     largest_chunk: int = 32_768
     keeps_rows: bool = False
     most_workers: int | None = None
@@ -72,10 +74,13 @@ class Flyer(ABC):
         """
 
     @abstractmethod
-    def histories(self, inputs: Inputs, noise: np.ndarray, rows: int) -> Iterator[tuple[Columns, Columns]]:
+    def histories(
+        self, inputs: Inputs, noise: np.ndarray, rows: int, stopped: Callable[[], bool] = never
+    ) -> Iterator[tuple[Columns, Columns]]:
         """(results, history) of each case, flown when it is asked for, perhaps together with those that follow it.
 
         history : t_s and the outputs, about `rows` rows, none of a refused case.
+        Raises RunStopped once `stopped()` is true, where a case may take long.
         """
 
     @abstractmethod

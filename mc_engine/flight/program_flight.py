@@ -40,12 +40,13 @@ _LINUX = sys.platform.startswith("linux")
 
 
 class Flown(NamedTuple):
-    """How a case ended.  metrics : by name; empty of a case that failed.  history : by column, empty without one."""
+    """How a case ended.  metrics, history : by column, perhaps empty.  left_out : of the history, as no outputs."""
 
     status: int
     reason: str
     metrics: dict[str, float]
     history: dict[str, np.ndarray]
+    left_out: tuple[str, ...] = ()
 
     def row(self, names: Sequence[str]) -> dict[str, Any]:
         """Status, reason and metrics by column; a metric that is not there is not a number."""

@@ -40,6 +40,8 @@ class SimulatorFlyer(Flyer):
         self._campaign, self.simulator = campaign, campaign.model
         self.keeps_rows = not self.simulator.batch  # a batch is one piece of work, as a chunk of a model is
         self.batch = _TOGETHER if self.simulator.batch else 1
+        if self.keeps_rows:
+            self.smallest_chunk = 1  # its cases may take long: no worker waits while others have cases left
         self.most_workers = self.simulator.slots
         self.tolerance = None if self.simulator.deterministic else self.simulator.tolerance
         self._names = [metric.name for metric in self.simulator.metrics]
@@ -72,14 +74,19 @@ class SimulatorFlyer(Flyer):
             refusals.add(~((column >= item.low) & (column <= item.high)), outside)
         return list(refusals.reason)
 
-    def histories(self, inputs: Inputs, noise: np.ndarray, rows: int) -> Iterator[tuple[Columns, Columns]]:
+    def histories(
+        self, inputs: Inputs, noise: np.ndarray, rows: int, stopped: Callable[[], bool] = never
+    ) -> Iterator[tuple[Columns, Columns]]:
         columns = {name: np.broadcast_to(np.asarray(value), len(noise)) for name, value in inputs.items()}
         for case in range(len(noise)):
-            yield self._history({name: column[[case]] for name, column in columns.items()}, noise[[case]], rows)
+            own = {name: column[[case]] for name, column in columns.items()}
+            yield self._history(own, noise[[case]], rows, stopped)
 
-    def _history(self, columns: Columns, noise: np.ndarray, rows: int) -> tuple[Columns, Columns]:
+    def _history(
+        self, columns: Columns, noise: np.ndarray, rows: int, stopped: Callable[[], bool]
+    ) -> tuple[Columns, Columns]:
         found: list[Columns] = []
-        flight = _Flight(self, columns, noise, None, never, on_history=found.append)
+        flight = _Flight(self, columns, noise, None, stopped, on_history=found.append)
         flight.fly()
         names = ["t_s", *(output.name for output in self.simulator.outputs)]
         history = found[0] if found and found[0] else {name: np.empty(0) for name in names}
@@ -125,7 +132,9 @@ class SimulatorFlyer(Flyer):
         ids = np.array([0])
         table = {} if self._campaign.first is not None else case_table(self._campaign, ids)
         nominal = np.array([NOMINAL_NOISE])
-        self._flown(nominal, {})  # starts the process
+        alone = {name: np.array([value]) for name, value in self._campaign.nominal.items()}
+        flight = _Flight(self, alone, nominal, None, never)
+        flight.fly()  # starts the process
         begin = time.perf_counter()
         twice = [(self._flown(nominal, {})[0], self._flown(ids, table)[0]) for _ in range(2)]
         seconds = (time.perf_counter() - begin) / 4
@@ -145,6 +154,8 @@ class SimulatorFlyer(Flyer):
             lines.append(f"the same in the nominal and in case 0: {', '.join(still)}; does an input move it?")
         if dispersed["status"] != STATUS_NAME[OK]:
             lines.append(f"case 0 ends as {dispersed['status']}: {dispersed['reason']}")
+        if flight.left_out:
+            lines.append(f"not saved, as no declared outputs: the columns {', '.join(flight.left_out)} of the history")
         asked = self._campaign.retention
         if not self.simulator.outputs and (asked.first or asked.cases or asked.worst_of):
             lines.append("no time histories are saved, because the simulator declares no outputs")
@@ -173,7 +184,7 @@ class SimulatorFlyer(Flyer):
 
 
 class _Flight:
-    """The cases of one call.  results : their columns, filled as cases end."""
+    """The cases of one call.  results : their columns, filled as cases end.  left_out : columns of the last history."""
 
     def __init__(
         self,
@@ -187,6 +198,7 @@ class _Flight:
     ):
         self._flyer, self._columns, self._noise = flyer, columns, noise
         self._keep, self._stopped, self._log, self._on_history = keep, stopped, log, on_history
+        self.left_out: tuple[str, ...] = ()
         simulator = flyer.simulator
         self._limit_s = simulator.time_limit_s if simulator.program is None else None  # which keeps its own
         n, self._names = len(noise), [metric.name for metric in simulator.metrics]
@@ -267,11 +279,13 @@ class _Flight:
         for k in np.flatnonzero(lost).tolist():
             values = {name: float(column[k]) for name, column in metrics.items()}
             self._put(places[k], Flown(NOT_FINITE, self._flyer.simulator.lost_metric(values), {}, {}))
+        self.left_out = shared.left_out
         if self._on_history is not None:
             self._on_history(shared.history)
 
     def _take(self, place: int, reply: Flown) -> None:
         self._put(place, reply)
+        self.left_out = reply.left_out
         if self._on_history is not None:
             self._on_history(reply.history)
 

@@ -50,9 +50,12 @@ class Dispatch:
         self._unnoted: Counter[int] = Counter()  # deaths without a record, by the first case of the task
         self._n_deaths, self._any_completed = 0, False
 
-    def receipts(self, tasks: Iterable[Task], stopped: Callable[[], bool]) -> Iterator[list[tuple[Task, Written]]]:
+    def receipts(
+        self, tasks: Iterable[Task], stopped: Callable[[], bool], waiting: Callable[[], None] = lambda: None
+    ) -> Iterator[list[tuple[Task, Written]]]:
         """Each task with the part that was written for it, in the order of completion; all that have come in at once.
 
+        waiting : called now and then while no part comes in.
         Once `stopped()` is true no further task begins; those under way complete as long as there are workers.
         Raises WorkersLost if the workers cannot be kept alive.
         """
@@ -63,6 +66,7 @@ class Dispatch:
             if result is None:
                 if stopped() and (self._leaves_now() or self._pool.without_workers_s() > DRAIN_S):
                     return
+                waiting()
                 continue
             done: list[tuple[Task, Written]] = []
             try:

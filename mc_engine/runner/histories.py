@@ -1,6 +1,7 @@
 """Cases flown once more: the chosen ones, sampled over time, for their histories; the first ones with finer steps."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from itertools import takewhile
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from mc_engine.campaign.cases import full_inputs
 from mc_engine.campaign.loading import Campaign
 from mc_engine.flight.chunks import drawn
-from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer
+from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, RunStopped
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import in_threads
 from mc_engine.model.simulator import Simulator
@@ -96,9 +97,12 @@ def _histories_of(campaign: Campaign, flyer: Flyer, cases: Sequence[int], stoppe
     if stopped():
         return []
     table, noise = drawn(campaign, np.array(cases, dtype=np.int64))
-    flights = flyer.histories(full_inputs(campaign, table), noise, campaign.retention.rows)
-    wanted = takewhile(lambda _: not stopped(), cases)
-    return [_with_case(case, next(flights)[1]) for case in wanted]
+    flights = flyer.histories(full_inputs(campaign, table), noise, campaign.retention.rows, stopped)
+    histories = []
+    with suppress(RunStopped):
+        for case in takewhile(lambda _: not stopped(), cases):
+            histories.append(_with_case(case, next(flights)[1]))
+    return histories
 
 
 def _are_kept(store: Store, campaign: Campaign, saved: list[int]) -> bool:

@@ -19,7 +19,8 @@ from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError,
 from mc_engine.flight.chunks import NOMINAL_TASK, Task, chunk_size, rerun_tasks
 from mc_engine.flight.flyer import Flyer
 from mc_engine.flight.flyers import flyer_of
-from mc_engine.interruption import in_threads, stop_signal
+from mc_engine.interruption import COMPLETING, GIVING_UP, in_threads, stop_signal
+from mc_engine.model.simulator import Simulator
 from mc_engine.runner.backends import Backend, flyer_on
 from mc_engine.runner.dispatch import Dispatch
 from mc_engine.runner.flown_campaign import companions_of
@@ -31,12 +32,15 @@ from mc_engine.runner.progress import ProgressCall
 from mc_engine.runner.summary import failed_cases
 from mc_engine.shell_words import shell_word
 from mc_engine.status import MOST_CASES, OK, STATUS_NAME
-from mc_engine.store.case_rows import recorded_cases, remove_logs
+from mc_engine.store.case_rows import recorded_cases, remove_logs, rows_so_far
 from mc_engine.store.opening import open_store
 from mc_engine.store.parts import Written, problem_of
 from mc_engine.store.repair import mend_journal, withdraw_damaged
 from mc_engine.store.run_files import JOURNAL, NOMINAL_CASE, SENSITIVITY, is_run_directory
 from mc_engine.store.store import Store, create_store
+
+_OF_A_CLUSTER = 512  # workers that a scheduler may have
+_LOOK_SELDOM = 20.0  # times what a look at the recorded rows takes, until the next one
 
 Done = Sequence[tuple[Task, Written]]  # what tasks wrote
 
@@ -77,7 +81,7 @@ def complete(store: Store, campaign: Campaign, session: Session, repair: bool = 
 
     repair : damaged parts count as missing.  Raises RunInterrupted with the command that continues the run.
     """
-    with _as_writer(store, "resume --repair" if repair else "resume", session) as stop:
+    with _as_writer(store, campaign, "resume --repair" if repair else "resume", session) as stop:
         _fly_missing(store, campaign, session, repair, stop)
     return store
 
@@ -126,14 +130,16 @@ def _counting(session: Session, flown: int, cases: int, failed: int = 0) -> Sess
 
 
 @contextmanager
-def _as_writer(store: Store, command: str, session: Session) -> Iterator[threading.Event]:
+def _as_writer(store: Store, campaign: Campaign, command: str, session: Session) -> Iterator[threading.Event]:
     """Hold the run's lock, and yield the event that a signal sets.
 
     command : continues the run.  A run that is stopped, by whatever cause, raises RunInterrupted with that command.
     """
     place = shell_word(store.path)
+    simulator = campaign.model if isinstance(campaign.model, Simulator) else None
+    left = simulator is not None and (not simulator.batch or session.backend.name == "threading")
     try:
-        with store.lock(), stop_signal() as stop:
+        with store.lock(), stop_signal(GIVING_UP if left else COMPLETING) as stop:
             yield stop
     except (StoreError, RunInterrupted, KeyboardInterrupt) as error:
         why = str(error)
@@ -153,7 +159,7 @@ def fly_failed(store: Store, campaign: Campaign, session: Session) -> Store:
     if store.missing():
         resume = f"`mc-engine resume {shell_word(store.path)}`"
         raise StoreError(f"{store.path}: is not complete; {resume} flies the rest first")
-    with _as_writer(store, "rerun --failed", session) as stop:
+    with _as_writer(store, campaign, "rerun --failed", session) as stop:
         tasks = rerun_tasks(store.path, store.parts)
         cases = sum(len(task.failed) for task in tasks)
         store.note("rerun", backend=session.backend.name, workers=session.workers, cases=cases)
@@ -210,13 +216,28 @@ def _run_tasks(
         for receipts in dispatch.receipts([NOMINAL_TASK] if nominal else [], stopped):
             commit(receipts)
         begun = time.perf_counter()
-        report(done, total, failed)
-        for receipts in dispatch.receipts(tasks, stopped):
+        told, next_look_s = (-1, -1), begun
+
+        def tell() -> None:
+            nonlocal told, next_look_s
+            look = time.perf_counter()
+            rows, lost = rows_so_far(store.path) if leaves else (0, 0)
+            next_look_s = look + _LOOK_SELDOM * (time.perf_counter() - look)
+            if (done + rows, failed + lost) != told:
+                told = done + rows, failed + lost
+                report(told[0], total, told[1])
+
+        def waiting() -> None:
+            if leaves and time.perf_counter() >= next_look_s:
+                tell()
+
+        tell()
+        for receipts in dispatch.receipts(tasks, stopped, waiting):
             commit(receipts)
             for task, written in receipts:
                 done += written.part.rows - (task.base.rows if task.base else 0)
                 failed += failed_cases(written.part.status) - (failed_cases(task.base.status) if task.base else 0)
-            report(done, total, failed)
+            tell()
         at_once = leaves and stopped()
         return begun
     except WorkersLost as error:
@@ -277,7 +298,10 @@ def _missing_tasks(store: Store, session: Session, flyer: Flyer) -> tuple[list[T
     end = store.wanted.stop
     along = stretches(store.notes(), min(end, store.manifest["campaign"]["cases"]), end)
     cases = sum(stop - first for first, stop in missing)
-    size = session.chunk or along[-1].chunk or chunk_size(cases, session.workers, flyer)
+    workers = session.workers
+    if flyer.keeps_rows and session.backend.scheduler is not None:  # its workers come and go
+        workers = max(workers, _OF_A_CLUSTER)
+    size = session.chunk or along[-1].chunk or chunk_size(cases, workers, flyer)
     if session.chunk is not None:
         along = [Stretch(end, session.chunk)]
     return [Task(*bounds) for bounds in part_bounds(missing, store.notes(), along, size)], size

@@ -20,6 +20,7 @@ from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.search import campaign_names
 from mc_engine.errors import StoreError, UsageError
 from mc_engine.flight.chunks import chunk_size, chunks_of
+from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import in_threads
 from mc_engine.runner.flown_campaign import campaign_of, companions_of
 from mc_engine.runner.manifest import columns_of, manifest_of
@@ -95,7 +96,7 @@ def merge_shards(
     pieces = list(_cover(stores))
     campaign = campaign_of(stores[0])
     run = create_store(out, manifest_of(campaign), campaign.text, columns_of(campaign), companions_of(campaign))
-    size = chunk or chunk_size(campaign.cases, os.cpu_count() or 1)
+    size = chunk or chunk_size(campaign.cases, os.cpu_count() or 1, flyer_of(campaign))
     with run.lock():
         run.note("merged", shards=len(stores), chunk=size)
         bounds = [*chunks_of([(0, campaign.cases)], size)]

@@ -14,6 +14,7 @@ from typing import Any
 from mc_engine.durable_file import is_temporary, names_in, read_short
 from mc_engine.errors import StoreError
 from mc_engine.shell_words import shell_word
+from mc_engine.store.case_rows import is_log
 from mc_engine.store.derived_files import STRANGE, derived_files, remade_by
 from mc_engine.store.histories import read_histories
 from mc_engine.store.journal import Scan, read_journal, scan
@@ -218,7 +219,9 @@ def _present(run: Path) -> Iterator[str]:
 def _half_written(run: Path) -> Iterator[Damage]:
     for path in sorted([*run.glob(".*.tmp"), *run.glob("*/.*.tmp")]):
         if path.is_file():
-            yield Damage(f"{path.relative_to(run).as_posix()}: is a temporary file", RESUME)
+            name = path.relative_to(run).as_posix()
+            what = "holds rows of complete cases, which are taken over" if is_log(name) else "is a temporary file"
+            yield Damage(f"{name}: {what}", RESUME)
 
 
 def _unrecorded(run: Path, present: list[str], counted: Receipts, remedy: str) -> Iterator[Damage]:

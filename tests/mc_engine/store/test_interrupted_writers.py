@@ -2,12 +2,14 @@
 
 import json
 
+import numpy as np
 import pytest
 from small_run import block
 
 from mc_engine import durable_file
 from mc_engine.errors import StoreError
 from mc_engine.store import journal, parts
+from mc_engine.store.case_rows import RowLog
 from mc_engine.store.opening import open_store
 from mc_engine.store.verification import RESUME, damage
 from tests.mc_engine.command_line.cart import call
@@ -44,6 +46,14 @@ def test_what_a_kill_leaves_is_told_and_is_no_damage(killed, name):
     with killed.lock():  # as `resume` does
         assert not (killed.path / name).exists()
     assert call("verify", killed.path).stderr == ""
+
+
+def test_rows_that_a_killed_simulator_recorded_are_told_to_be_kept(killed):
+    log = RowLog(killed.path, 10, 20).of(np.array([12]))
+    log.add(0, {"status": "ok", "reason": ""})
+    log.close()
+    said = call("verify", killed.path).stderr
+    assert "simulator/.rows-10-20.tmp: holds rows of complete cases, which are taken over; " in said
 
 
 @pytest.mark.parametrize("harm", ["none", "flipped", "cut"])
