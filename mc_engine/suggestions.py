@@ -34,6 +34,8 @@ _OTHER_NAMES = {
     "3sigma": "three_sigma",
     "degree": "deg",
     "degrees": "deg",
+    "high": "upper",
+    "low": "lower",
     "hours": "h",
     "hrs": "h",
     "kilograms": "kg",

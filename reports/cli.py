@@ -59,7 +59,7 @@ def write_reports(
     Returns the paths of the reports and of files that belong to them (a footprint's KML), not of a Markdown report's
     figures.  The contents are built once.  All files of a format appear together or not at all.
     """
-    formats = (formats,) if isinstance(formats, str) else formats
+    formats = (formats,) if isinstance(formats, str) else tuple(formats)
     if unknown := [name for name in formats if name not in FORMATS]:
         raise UsageError(f'"{unknown[0]}" is no format of a report; use {", ".join(FORMATS)}')
     path = path_of(run_path, "a report is made by the path of a run, and {} is none")

@@ -48,6 +48,8 @@ _FREE_NAME = re.compile(r"\w[\w-]{0,59}")  # of what the file itself names; it s
 # tomllib takes a time that grows with the square of the parts of a dotted key; a campaign file has keys of three.
 _LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){32}""")
 
+_LARGEST_EXACT = 2**53  # whole number of which a float64 has all digits
+
 _MESSAGES = {
     "int_type": "{shown} is not a whole number{whole}",
     "float_type": "{shown} is not a number",
@@ -326,12 +328,26 @@ def _message(section: type[Section] | None, details: ErrorDetails) -> str:
         if isinstance(value, str):
             return f"{shown(value)} is not known{hint(value, allowed)}"
         return f"{shown(value)} is not one of {listed(allowed)}"
-    whole = f"; write {int(value)}" if isinstance(value, float) and value.is_integer() else ""
+    whole = ""
+    if kind == "int_type" and isinstance(value, float) and value.is_integer():
+        least, most = _range_of(section, location)
+        if least <= value <= most:
+            whole = f"; write {int(value)}"
+        else:
+            kind, context = ("less_than_equal", {"le": most}) if value > most else ("greater_than_equal", {"ge": least})
     limits = {key: f"{limit:g}" if isinstance(limit, float) else limit for key, limit in context.items()}
     template = _MESSAGES.get(kind)
     if template is None:
         return f"{shown(value)}: {_lower_first(details['msg'])}"
     return template.format(shown=shown(value), whole=whole, **limits)
+
+
+def _range_of(section: type[Section] | None, location: tuple[int | str, ...]) -> tuple[int, int]:
+    """(least, most) of the whole numbers that a key takes."""
+    field = _keys(_class_at(section, location)).get(str(location[-1])) if section is not None else None
+    limits = field.metadata if field is not None else []
+    least = max((limit.ge for limit in limits if hasattr(limit, "ge")), default=-_LARGEST_EXACT)
+    return least, min((limit.le for limit in limits if hasattr(limit, "le")), default=_LARGEST_EXACT)
 
 
 def _keys(section: type[BaseModel]) -> dict[str, FieldInfo]:

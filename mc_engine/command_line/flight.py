@@ -229,7 +229,7 @@ def finish(
     typer.echo(f"run          {store.path}")
     typer.echo(f"cases        {case_line(store)}")
     if nominal := nominal_line(store):
-        typer.echo(f"nominal      failed: {nominal}")
+        typer.echo(f"nominal      {nominal}")
     if analyses := analyses_line(store):
         typer.echo(f"analyses     {analyses}")
     judged, joint = outcomes(store)

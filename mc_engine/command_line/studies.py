@@ -158,7 +158,7 @@ def rare(
         method=method,
         cases_per_level=cases_per_level,
         workers=workers,
-        progress=lambda flown, failed: lines.tell(f"{flown:,} cases, {failed:,} of them failed"),
+        progress=lambda flown, failed: lines.tell(f"{flown:,} cases, {failed:,} of them outside the limit"),
     )
     _echo_result(path, [f"rare event   {path}", *rare_event_lines(estimate.result)], no_report)
 

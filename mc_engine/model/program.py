@@ -268,15 +268,15 @@ def _inputs(
         try:
             text = contents[resolve_beside(directory, kind)].decode()
             tree = template_environment().parse(text)
+            names = meta.TrackingCodeGenerator(tree.environment)
+            names.optimizer = None  # it would compute the constants of the template
+            names.visit(tree)  # which finds filters that are not there, too
         except UnicodeDecodeError:
             problems.append((key, f'"{kind}" is not text in UTF-8'))
             continue
         except TemplateSyntaxError as error:
             problems.append((key, f"{kind}, line {error.lineno}: {error.message}"))
             continue
-        names = meta.TrackingCodeGenerator(tree.environment)
-        names.optimizer = None  # it would compute the constants of the template
-        names.visit(tree)
         for missing in sorted(names.undeclared_identifiers - {*known}):
             problems.append((key, f'{kind}: "{missing}" is no input{hint(missing, known)}'))
         inputs[name] = text

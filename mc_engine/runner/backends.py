@@ -90,11 +90,20 @@ class Backend:
 
 def _refuse_no_address(scheduler: str) -> None:
     from distributed.comm import resolve_address
+    from distributed.security import Security
 
     try:
         resolve_address(scheduler)
-    except (OSError, ValueError, TypeError) as error:  # OSError: a host that is not known
-        raise EngineError(f"--scheduler {scheduler}: {error}; write an address such as tcp://node1:8786") from None
+    except Exception as error:  # of a host that is not known, or a protocol that is not installed
+        why = " ".join(str(error).split())
+        raise EngineError(f"--scheduler {scheduler}: {why}; write an address such as tcp://node1:8786") from None
+    try:
+        keys = Security().get_connection_args("client")["ssl_context"]
+    except OSError as error:  # of a file that is no key, or not there
+        raise EngineError(f"--scheduler {scheduler}: the keys of Dask's configuration: {error}") from None
+    if scheduler.startswith(("tls://", "wss://")) and keys is None:
+        named = "distributed.comm.tls, with ca-file, client.cert and client.key"
+        raise EngineError(f"--scheduler {scheduler}: needs keys; name them in Dask's configuration, {named}")
 
 
 def flyer_on(backend: str, campaign: Campaign) -> Flyer:

@@ -149,7 +149,7 @@ def _client(scheduler: Any) -> Iterator[Any]:
 
     try:
         client = Client(scheduler, timeout=START_S, set_as_default=False)
-    except (OSError, ValueError) as error:  # nobody there
+    except Exception as error:  # nobody there, or a protocol that cannot be used
         raise WorkersLost(f"--scheduler {scheduler}: there is no scheduler: {error}") from error
     try:
         yield client

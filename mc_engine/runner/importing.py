@@ -24,7 +24,7 @@ from mc_engine.runner.flown_campaign import companions_of
 from mc_engine.runner.manifest import columns_of, manifest_of
 from mc_engine.sampling.distributions import column as typed_column
 from mc_engine.status import NO_RESULT, NOT_FINITE, OK, STATUS_NAME
-from mc_engine.store.run_files import NOMINAL_CASE
+from mc_engine.store.run_files import NO_NOMINAL, NOMINAL_CASE
 from mc_engine.store.store import Store, create_store
 from mc_engine.suggestions import hint
 
@@ -195,8 +195,7 @@ def _nominal(campaign: Campaign, table: Columns, place: np.ndarray, values: Colu
     if place.size:
         row = {**known, **_judged(campaign, table, place, {name: values[name][place] for name in metrics})}
     else:
-        why = "the imported table has no case -1, the nominal"
-        row = {**known, "status": STATUS_NAME[NO_RESULT], "reason": why, **dict.fromkeys(metrics, np.nan)}
+        row = {**known, "status": STATUS_NAME[NO_RESULT], "reason": NO_NOMINAL, **dict.fromkeys(metrics, np.nan)}
     return {name: typed_column(np.ravel(value).tolist()) for name, value in row.items()}
 
 

@@ -11,6 +11,7 @@ from mc_engine.section import ReportSection
 from mc_engine.shell_words import shell_word
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
 from mc_engine.store.parts import CASE_COLUMNS, Column, Part, numbers_in, read_part, rows_with
+from mc_engine.store.run_files import NO_NOMINAL
 from mc_engine.store.store import Store
 
 if TYPE_CHECKING:
@@ -69,10 +70,12 @@ def case_line(store: Store) -> str:
 
 
 def nominal_line(store: Store) -> str:
-    """The status of a nominal case that failed, with its reason; empty where it is ok."""
+    """That the nominal case failed, with status and reason, or was not imported; empty where it is ok."""
     row = store.nominal()
     failed = row.get("status", STATUS_NAME[OK]) != STATUS_NAME[OK]
-    return ", ".join(str(row[name]) for name in ("status", "reason") if row[name]) if failed else ""
+    if not failed or row["reason"] == NO_NOMINAL:
+        return NO_NOMINAL if failed else ""
+    return f"failed: {', '.join(str(row[name]) for name in ('status', 'reason') if row[name])}"
 
 
 def judgement(store: Store) -> "tuple[list[Verdict], Verdict | None]":

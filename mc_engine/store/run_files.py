@@ -11,6 +11,7 @@ from mc_engine.errors import UsageError
 JOURNAL, MANIFEST = "journal.jsonl", "manifest.json"
 CAMPAIGN = "campaign.toml"
 NOMINAL, NOMINAL_CASE = "nominal.parquet", -1  # file and case_id of the nominal case
+NO_NOMINAL = "the imported table has no case -1, the nominal"  # reason in its row then
 SENSITIVITY = "sensitivity"  # the run directory, inside a run, of the flights for contributions
 SIMULATOR = "simulator"  # the folder, inside a run, of what cases of a simulator left behind
 CUT_SHORT = {temporary_name(name) for name in (CAMPAIGN, MANIFEST, JOURNAL, NOMINAL)}  # of a creation cut short

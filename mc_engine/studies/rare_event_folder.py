@@ -68,7 +68,7 @@ def probability_words(result: dict[str, Any]) -> str:
     allows = f"the requirement allows {allowed:.3g} with {sure} % confidence"
     lower, upper = printed_interval(result)
     if not result["probability"]:
-        return f"below {upper:.3g}; no case failed ({allows})"
+        return f"below {upper:.3g}; no case was outside the limit ({allows})"
     interval = f"{percent_digits(result['confidence'])} % interval {lower:.3g} to {upper:.3g}"
     return (
         f"{result['probability']:.3g} of not meeting it, {interval}, by {METHOD_WORDS[result['method']]}; "
@@ -89,7 +89,7 @@ def standing(result: dict[str, Any]) -> str:
 
 
 def cost_words(result: dict[str, Any]) -> str:
-    text = f"{result['cases']:,} flown, {result['failed']:,} of them failed"
+    text = f"{result['cases']:,} flown, {result['failed']:,} of them outside the limit"
     if result["no_number"]:
         text += f" ({result['no_number']:,} without a number)"
     if result["plain_cases"] is None or result["method"] == "plain":
@@ -121,7 +121,8 @@ def _input_lines(result: dict[str, Any]) -> Iterator[str]:
         return
     width = max(len(record["name"]) for record in result["inputs"])
     across = result["inputs"][0].get("across") is not None
-    yield f"failed cases, by input: mean and spread in sigmas; the likeliest{', and the one across' * across}"
+    ends = "the likeliest, and the one across" if across else "the likeliest"
+    yield f"cases outside the limit, by input: mean and spread in sigmas; {ends}"
     for record in sorted(result["inputs"], key=lambda item: -abs(item["likeliest_sigma"])):
         texts = [
             f"{record[case]:.5g}{' ' * bool(record['unit'])}{record['unit']} ({record[f'{case}_sigma']:+.2f} σ)"

@@ -7,6 +7,7 @@ from mc_engine.statistics import Summary, Verdict
 from mc_engine.statistics.requirements import EXTENSIBLE
 from mc_engine.statistics.worst import Limits
 from mc_engine.status import OK, STATUS_NAME
+from mc_engine.store.run_files import NO_NOMINAL
 from reports.document.blocks import Card
 from reports.run.flown import URGENCY, Flown
 from reports.sections.convergence import MUCH
@@ -162,7 +163,9 @@ def warnings(flown: Flown) -> tuple[str, ...]:
             f"{count(failed)} of {count(flown.n_tried)} cases failed; they count against every requirement."
         )
     status, reason = (str(flown.nominal.get(name) or "") for name in ("status", "reason"))
-    if status not in ("", STATUS_NAME[OK]):
+    if reason == NO_NOMINAL:
+        sentences.append(f"{reason.capitalize()}.")
+    elif status not in ("", STATUS_NAME[OK]):
         sentences.append(
             f"The nominal case failed with the status {status}{f', {reason}' if reason else ''}: it has no metrics."
         )

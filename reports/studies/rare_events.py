@@ -63,8 +63,8 @@ GLOSSARY = Terms(
     (
         (
             "margin",
-            "How far the metric is inside its limit, in its own unit; the nearer one of two limits. A case that did "
-            "not complete, or has no number, has failed.",
+            "How far the metric is inside its limit, in its own unit; the nearer one of two limits. A case outside a "
+            "limit is called failed here, as is one that did not complete or has no number.",
         ),
         (
             "subset simulation",

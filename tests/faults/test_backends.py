@@ -167,6 +167,7 @@ def test_a_shard_is_no_run_to_extend_or_to_take_inputs_from(campaign, tmp_path):
         (("dask", None, None, None, float("nan")), "patience_s: nan is not allowed"),
         (("dask", 8786), "--scheduler 8786: .*; write an address such as tcp://node1:8786"),
         (("dask", "foo://node:1"), "unknown address scheme 'foo'"),
+        (("dask", "tls://127.0.0.1:1"), "needs keys; name them in Dask's configuration, distributed.comm.tls"),
         (("dask", "no such:x"), "--scheduler no such:x: "),
         (("loky", None, None, None, 60.0), 'patience is for the backend "dask", whose workers come and go'),
     ],

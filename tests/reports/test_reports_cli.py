@@ -35,6 +35,7 @@ def test_both_reports_are_written_beside_the_data(run_path):
 
 def test_one_format_is_enough_if_asked_for(run_path):
     assert [path.name for path in reports.report(run_path, "html")] == ["report.html"]
+    assert [path.name for path in reports.write_reports(run_path, iter(["json"]))] == ["report.json"]
     assert not (run_path / "report.pdf").exists()
 
 

@@ -31,6 +31,8 @@ def test_all_mistakes_are_found_in_one_pass():
         dist = "nromal"
         [dispersion.b]
         dist = "normal"
+        low = 0.0
+        high = 2.0
         sgima = 1.0
         sigma = -2
         [[correlation]]
@@ -50,6 +52,8 @@ def test_all_mistakes_are_found_in_one_pass():
         "campaign.seed": "-1 is not allowed; it must be at least 0",
         "parameters.mass_kg": "nan is not a finite number",
         "dispersion.a.dist": '"nromal" is not known; did you mean "normal"?',
+        "dispersion.b.low": 'is not a known key; did you mean "lower"?',
+        "dispersion.b.high": 'is not a known key; did you mean "upper"?',
         "dispersion.b.sgima": 'is not a known key; did you mean "sigma"?',
         "dispersion.b.sigma": "-2 is not allowed; it must be above 0",
         "correlation 1.between": "1 given; at least 2 needed",
@@ -65,6 +69,8 @@ def test_a_number_of_cases_that_is_none_is_refused():
         ("cases = -3", "-3 is not allowed; it must be at least 1"),
         ("cases = 2_000_000_000", "2000000000 is not allowed; it must be at most 1000000000"),
         ("cases = 1e4", "10000.0 is not a whole number; write 10000"),
+        ("cases = 1e30", "1e+30 is not allowed; it must be at most 1000000000"),
+        ("cases = -2.0", "-2.0 is not allowed; it must be at least 1"),
         ("cases = 2.5", "2.5 is not a whole number"),
         ('cases = "many"', '"many" is not a whole number'),
         ("cases = false", "false is not a whole number"),

@@ -13,10 +13,12 @@ from mc_engine import CampaignError, StoreError, load_campaign, open_run, replay
 from mc_engine.command_line import before_flight
 from mc_engine.command_line.commands import app
 from mc_engine.flight.simulated import about
+from mc_engine.interruption import GIVING_UP
 from mc_engine.runner import histories
 from mc_engine.runner.importing import import_results
 from mc_engine.runner.runner import Backend, extend, rerun
-from mc_engine.runner.summary import judgement
+from mc_engine.runner.summary import judgement, nominal_line
+from mc_engine.store.run_files import NO_NOMINAL
 from tests.mc_engine.flight.falling_ball import CAMPAIGN, PROGRAM, program_campaign, python_campaign
 
 METRICS = ["fall_time_s", "impact_speed_m_s"]
@@ -70,6 +72,7 @@ def test_check_tells_what_a_simulator_lacks(tmp_path, monkeypatch):
     assert "has not ended after 0.1 s; Ctrl-C ends it, and `time_limit_s`" in said.stderr
     assert "differ between two flights of a case; draw from case.rng or case.seed, or `replay` finds" in said.stdout
     assert "no time histories are saved, because the simulator declares no outputs" in said.stdout
+    assert "not saved, as no declared outputs: the columns speed_m_s of the history" in said.stdout
 
 
 def test_draws_of_a_case_are_its_own(tmp_path):
@@ -145,16 +148,57 @@ def test_an_interrupted_run_counts_the_cases_whose_rows_are_recorded(tmp_path):
     fault = (
         "import os, signal, time\nif case.id == 3: os.kill(int(os.environ['ENGINE']), signal.SIGINT); time.sleep(30)"
     )
-    file = python_campaign(tmp_path / "ball", cases=6, fault=fault)
+    file = python_campaign(tmp_path / "ball", cases=48, fault=fault)
     words = [sys.executable, "-m", "mc_engine"]
-    code = (
-        "import os, runpy; os.environ['ENGINE'] = str(os.getpid()); runpy.run_module('mc_engine', run_name='__main__')"
-    )
-    flight = [sys.executable, "-c", code, "run", file, "--workers", "1", "--no-report", "--out", tmp_path / "run"]
-    said = subprocess.run(flight, capture_output=True, text=True, timeout=60).stderr
-    assert "interrupted with 0 of 6 cases and the rows of 3 more; `mc-engine resume" in said
+    said = interrupted(file, tmp_path / "run")
+    assert GIVING_UP in said.splitlines()
+    assert "interrupted with 0 of 48 cases and the rows of 3 more; `mc-engine resume" in said
     said = subprocess.run([*words, "status", tmp_path / "run"], capture_output=True, text=True, timeout=60).stdout
     assert "flies them but 3 whose rows are recorded\n" in said
+
+
+def test_few_long_cases_are_shared_out_among_the_workers(tmp_path):
+    wait = [
+        "import os, time",
+        f"os.close(os.open(f'{tmp_path}/flies-{{case.id}}', os.O_CREAT))",
+        f"other, end = f'{tmp_path}/flies-{{1 - case.id}}', time.monotonic() + 30.0",
+        "while case.id >= 0 and not os.path.exists(other) and time.monotonic() < end: time.sleep(0.01)",
+        "assert case.id < 0 or os.path.exists(other), 'the other case does not fly'",
+    ]
+    campaign = load_campaign(python_campaign(tmp_path / "ball", cases=2, fault="\n".join(wait)))
+    assert set(run(campaign, tmp_path / "run", workers=2).cases()["reason"]) == {""}
+
+
+def test_the_progress_counts_cases_that_no_part_holds_yet(tmp_path):
+    fault = "import time\nif case.id > 0: time.sleep(0.5)\nif case.id == 1: raise ValueError('no air')"
+    campaign, seen = load_campaign(python_campaign(tmp_path / "ball", cases=4, fault=fault)), []
+    run(campaign, tmp_path / "run", workers=1, chunk=4, progress=lambda *counts: seen.append(counts))
+    assert (1, 4, 0) in seen
+    assert (3, 4, 1) in seen
+    assert seen[-1] == (4, 4, 1)
+
+
+def test_a_stopped_run_ends_a_case_that_flies_for_its_history(tmp_path):
+    """It may hang there as well as in its first flight, and has no time limit."""
+    mark = tmp_path / "flown"
+    fault = [
+        "import os, signal, time",
+        f"again = case.id == 0 and os.path.exists({str(mark)!r})",
+        "if again: os.kill(int(os.environ['ENGINE']), signal.SIGINT); time.sleep(300)",
+        f"if case.id == 0: open({str(mark)!r}, 'w').close()",
+    ]
+    file = python_campaign(tmp_path / "ball", cases=2, fault="\n".join(fault))
+    said = interrupted(file, tmp_path / "run")
+    assert GIVING_UP in said.splitlines()
+    assert "interrupted with 2 of 2 cases and without the saved time histories; `mc-engine resume" in said
+
+
+def interrupted(file, out):
+    """What a run says on standard error, whose cases know it by the variable ENGINE and send it a signal."""
+    begin = "import os, runpy; os.environ['ENGINE'] = str(os.getpid())"
+    words = [sys.executable, "-c", f"{begin}; runpy.run_module('mc_engine', run_name='__main__')", "run", file]
+    words += ["--workers", "1", "--no-report", "--out", out]
+    return subprocess.run(words, capture_output=True, text=True, timeout=60).stderr
 
 
 def test_a_changed_simulator_is_another_one(tmp_path):
@@ -174,6 +218,7 @@ MISTAKES = {
     "never read": ('result = "result.json"', "", "is never read; give it a `pattern` over stdout"),
     "two things": ("[campaign]", '[campaign]\nsimulator = "sim.py"', "beside the table [simulator]"),
     "template": ("case.txt.j2", "other.j2", 'other.j2: "mas_kg" is no input; did you mean "mass_kg"?'),
+    "filter": ("case.txt.j2", "filter.j2", "filter.j2, line 2: No filter named 'runden'."),
     "default": ("low = 0.1", "low = 20.0", "mass_kg: the model's own value 10 is not within"),
     "tolerance": ("time_limit_s", "tolerance = 1e-9\ntime_limit_s", "has a `tolerance`, and `replay` compares bits"),
     "outside": (
@@ -190,6 +235,7 @@ def test_mistakes_are_sentences_with_their_place(tmp_path, mistake):
     (tmp_path / "fall").write_text("#!/bin/sh\n")
     (tmp_path / "case.txt.j2").write_text("{{ mass_kg }}")
     (tmp_path / "other.j2").write_text("{{ mas_kg }}")
+    (tmp_path / "filter.j2").write_text("\n{{ mass_kg | runden }}")
     text = CAMPAIGN.format(flies="", cases=4) + PROGRAM
     assert old in text
     (tmp_path / "campaign.toml").write_text(text.replace(old, new))
@@ -213,6 +259,7 @@ def test_results_from_elsewhere_make_the_same_run(tmp_path, flown):
     assert store.cases().equals(flown["case"].cases())
     assert judgement(store)[0] == judgement(flown["case"])[0]
     assert store.manifest["imported"]["file"] == "results.parquet"
+    assert nominal_line(store) == NO_NOMINAL  # not as if it had been flown and had failed
     with pytest.raises(StoreError, match=r"imported from results\.parquet; the engine did not fly them"):
         replay(tmp_path / "run", 3)
 

@@ -49,7 +49,7 @@ def test_a_nominal_case_that_failed_is_told_with_its_reason(tmp_path):
     store.write_nominal({**row, "status": "ok", "reason": ""})
     assert nominal_line(store) == ""
     store.write_nominal({**row, "status": "step-limit", "reason": 'in the phase "hover"'})
-    assert nominal_line(store) == 'step-limit, in the phase "hover"'
+    assert nominal_line(store) == 'failed: step-limit, in the phase "hover"'
 
 
 def test_a_verdict_reads_as_a_sentence_with_its_unit(tmp_path):

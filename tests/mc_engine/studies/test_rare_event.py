@@ -194,6 +194,7 @@ def test_the_command_line_says_probability_interval_cost_and_failures(tmp_path):
     record = open_rare_event(tmp_path / "out")
     for line in rare_event_lines(record.result):
         assert line in done.output
+    assert f"{record.result['failed']:,} of them outside the limit" in done.output  # they have completed
     status = CliRunner().invoke(app, ["status", str(tmp_path / "out")])
     assert "requirement  apogee: apogee_altitude_km at least 600 km" in status.output
     assert CliRunner().invoke(app, ["verify", str(tmp_path / "out")]).exit_code == 0
