@@ -268,9 +268,16 @@ def publish(folder: RunFolder, url: Url) -> None:
 
 def echo_publication(folder: Path, url: str) -> None:
     """Publish the run, and print what was sent."""
+    from mc_engine.errors import StoreError, UsageError
     from mc_engine.store.object_store import publish
 
-    done = publish(folder, url)
+    try:
+        done = publish(folder, url)
+    except StoreError as error:
+        if isinstance(error, UsageError) or not str(error).startswith(url):  # of the request, or of the run itself
+            raise
+        again = f"`mc-engine publish {shell_word(folder)} {shell_word(url)}`"
+        raise StoreError(f"{error}; the run is safe, {again} sends the rest") from error
     files = counted(len(done.sent), "file")
     typer.echo(f"published    {done.url}: {files}, {done.sent_bytes:,} bytes; {done.kept} were there")
 

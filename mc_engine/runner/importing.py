@@ -142,7 +142,7 @@ def _refuse_unknown_words(table: Columns, problems: list[Problem]) -> None:
         unknown = np.flatnonzero(~(pd.isna(cells) | np.isin(cells.astype(str), ["", *known])))
         if unknown.size:
             word = str(cells[unknown[0]])
-            message = f'row {unknown[0] + 1}: "{word:.60}" is none of {", ".join(known)}{hint(word, known)}'
+            message = f'row {unknown[0] + 1}: "{word:.60}" is no status of a case{hint(word, known)}'
             problems.append(Problem("status", message))
 
 
@@ -201,6 +201,9 @@ def _nominal(campaign: Campaign, table: Columns, place: np.ndarray, values: Colu
 
 def _read_history(campaign: Campaign, file: Path) -> Columns:
     """The columns of a history table; CampaignError for one that is missing, unknown cases, and times that fall."""
+    if not campaign.model.quantities:
+        what = "declares no outputs, of which a time history could be kept; leave --history out, or declare them"
+        raise CampaignError(file.name, [Problem("", f"{campaign.model.name} {what}")])
     with _problems_of(file):
         table = read_columns(file)
         names = ["case_id", "t_s", *(quantity.name for quantity in campaign.model.quantities)]

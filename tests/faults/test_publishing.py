@@ -55,6 +55,7 @@ def test_success_is_said_only_of_what_is_listed_and_read_back(run, away, lie, mo
     done = call("publish", run, f"file://{away}")
     assert done.exit_code == 5
     assert "is not there; publish again" in done.stderr
+    assert f"the run is safe, `mc-engine publish {run} file://{away}` sends the rest" in done.stderr
     assert "published" not in done.stdout
 
 

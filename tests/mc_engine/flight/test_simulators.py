@@ -325,7 +325,7 @@ def test_words_and_numbers_of_imported_results_are_checked(tmp_path, flown):
     campaign = load_campaign(python_campaign(tmp_path / "ball"))
     table.loc[7, "status"] = "crashd"
     table.to_csv(tmp_path / "results.csv", index=False)
-    with pytest.raises(CampaignError, match=r'status: row 8: "crashd" is none of ok, .*; did you mean "crashed"'):
+    with pytest.raises(CampaignError, match=r'status: row 8: "crashd" is no status of a case; did you mean "crashed"'):
         import_results(campaign, tmp_path / "results.csv", tmp_path / "run")
     table.loc[7, "status"] = "crashed"
     for cell in ("1_0", "\u0663", "soon"):
@@ -339,6 +339,16 @@ def test_words_and_numbers_of_imported_results_are_checked(tmp_path, flown):
     assert store.status_counts() == {"ok": 99, "crashed": 1}
     others = table.index != 7
     assert store.cases()["fall_time_s"][others].equals(flown["case"].cases()["fall_time_s"][others])
+
+
+def test_an_imported_history_of_which_nothing_is_declared_is_refused(tmp_path, flown):
+    flown["case"].cases().to_csv(tmp_path / "results.csv", index=False)
+    flown["case"].histories().to_csv(tmp_path / "history.csv", index=False)
+    file = python_campaign(tmp_path / "ball")
+    source = file.with_name("sim.py")
+    source.write_text(source.read_text().replace('outputs=outputs(speed_m_s="speed"),', ""))
+    with pytest.raises(CampaignError, match=r"history\.csv: .*\n.* declares no outputs, of which a time history could"):
+        import_results(load_campaign(file), tmp_path / "results.csv", tmp_path / "run", tmp_path / "history.csv")
 
 
 def with_nominal(flown, tmp_path, **changes):
