@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
+from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,15 @@ if TYPE_CHECKING:
     from mc_engine.model.program import Program
 
 KEPT = ("none", "failed", "all")  # of the folders of cases
+_KINDS: dict[str, tuple[Any, str]] = {
+    **dict.fromkeys(("title", "name", "source"), (str, "text")),
+    **dict.fromkeys(("batch", "deterministic"), (bool, "True or False")),
+    **dict.fromkeys(("time_limit_s", "memory_limit_mib"), (Real | None, "a number")),
+    "slots": (Integral | None, "a whole number"),
+    "tolerance": (Real, "a number"),
+    **dict.fromkeys(("fly", "start"), (Callable | None, "a function")),
+    "published": (tuple | list, "a tuple"),
+}
 LONGEST_S, LARGEST_MIB = 1e8, 2**30
 
 
@@ -114,6 +124,10 @@ class Simulator:
         shared = tuple(item for item in self.parameters if isinstance(item, Setting))
         object.__setattr__(self, "parameters", tuple(item for item in self.parameters if item not in shared))
         object.__setattr__(self, "settings", (*self.settings, *shared))
+        for name, (kind, words) in _KINDS.items():
+            value = getattr(self, name)
+            if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+                raise ModelError(f"the simulator has {value!r} as its `{name}`; it must be {words}")
         refuse_false_simulator(self)
         if self.keep not in KEPT:
             raise ModelError(f'the simulator has "{self.keep}" as its `keep`; it must be one of {", ".join(KEPT)}')

@@ -8,12 +8,28 @@ from pathlib import Path
 
 import pytest
 
+from mc_engine import Simulator
 from mc_engine.errors import ModelError
-from mc_engine.model import Event, Field, Parameter, load_model
+from mc_engine.model import Event, Field, Parameter, inputs, load_model, metrics
 from tests.mc_engine.store.small_run import ENVIRONMENT
 
 WAVE_FOLDER = Path(__file__).resolve().parents[1] / "lanes" / "models"
 WAVE = load_model("wave.py", WAVE_FOLDER)
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"fly": 3}, "has 3 as its `fly`; it must be a function"),
+        ({"deterministic": "no"}, "has 'no' as its `deterministic`; it must be True or False"),
+        ({"slots": 2.5}, "has 2.5 as its `slots`; it must be a whole number"),
+        ({"time_limit_s": "3"}, "has '3' as its `time_limit_s`; it must be a number"),
+        ({"published": 3}, "has 3 as its `published`; it must be a tuple"),
+    ],
+)
+def test_a_simulator_whose_record_holds_something_else_is_refused(given, sentence):
+    with pytest.raises(ModelError, match=re.escape(sentence)):
+        Simulator(title="A wave", parameters=inputs(), metrics=metrics(time_s="time"), **given)
 
 
 def test_a_model_that_contradicts_itself_is_refused():
