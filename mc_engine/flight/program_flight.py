@@ -35,8 +35,8 @@ PROGRAM_ID = "program_id"  # file with the process group of the program in fligh
 BOUNDED_S, TEMPLATE_MIB = 10.0, 2048  # that a template or a pattern may take for one case
 LOOK_EVERY_S = 0.02  # between two looks at the memory of a program, and whether it has ended
 MOST_STDOUT, MOST_STDERR, MOST_RESULT = 2**24, 2**16, 2**26  # bytes
-_MIB = 2**20
-_LINUX = sys.platform.startswith("linux")
+_MIB, _LINUX = 2**20, sys.platform.startswith("linux")
+_WORK = re.compile(r"[^\s'\"]*/mc-engine-\w{8}/")  # the folder of a worker, which is another one each time
 
 
 class Flown(NamedTuple):
@@ -57,7 +57,7 @@ class Flown(NamedTuple):
 def flown(
     status: int, reason: str, metrics: dict[str, float] | None = None, history: dict[str, np.ndarray] | None = None
 ) -> Flown:
-    return Flown(status, clean(" ".join(reason.split()))[:600], metrics or {}, history or {})
+    return Flown(status, clean(" ".join(_WORK.sub("", reason).split()))[:600], metrics or {}, history or {})
 
 
 @dataclass

@@ -15,7 +15,7 @@ from mc_engine.errors import ModelError
 from mc_engine.flight.case_process import CaseEnded, CaseProcess, give_back, take
 from mc_engine.flight.case_worker import Order, Setup, folder_name, settle
 from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, Inputs, Process, RunStopped, never, other_bits
-from mc_engine.flight.program_flight import Flown
+from mc_engine.flight.program_flight import Flown, flown
 from mc_engine.model.fields import Setting, inputs_of
 from mc_engine.model.record import Refusals
 from mc_engine.model.simulator import Simulator
@@ -297,7 +297,7 @@ class _Flight:
         noise, rule = int(self._noise[place]), self._flyer.simulator.keep
         inputs = {name: column[[place]].tolist()[0] for name, column in self._columns.items()}
         process.end(lambda work: settle(rule, work, folder_name(noise), -1, self._keep, inputs))
-        ended = Flown(end.status, end.reason, {}, {})
+        ended = flown(end.status, end.reason)
         self._put(place, ended)
         if self._log is not None:
             log = self._log.at([place])

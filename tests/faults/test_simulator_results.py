@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from mc_engine import load_campaign, run
+from mc_engine import load_campaign, replay, run
 from mc_engine.flight import program_flight
 from tests.mc_engine.flight.falling_ball import python_campaign
 
@@ -82,3 +82,18 @@ def test_a_history_that_cannot_be_read_is_no_result(tmp_path, options):
     assert set(rows["status"]) == {"no-result"}
     for said, (_, reason) in zip(rows["reason"], HISTORIES.values(), strict=True):
         assert reason in said
+
+
+def test_the_reason_of_a_case_is_the_same_whichever_folder_its_worker_has(tmp_path):
+    """Otherwise its replay, and another shard with the same case, would differ from what is stored."""
+    fault = [
+        "import os, sys",
+        "if case.id == 0: open(case.folder / 'none.txt')",
+        "if case.id == 1: print('no', case.folder / 'none.txt', file=sys.stderr, flush=True); os._exit(3)",
+    ]
+    campaign = load_campaign(python_campaign(tmp_path / "ball", cases=2, fault="\n".join(fault)))
+    store = run(campaign, tmp_path / "run", workers=1)
+    missing = "sim.py, line 12: FileNotFoundError: [Errno 2] No such file or directory: 'case-0000000/none.txt'"
+    assert store.row(0)["reason"] == missing
+    assert store.row(1)["reason"] == "ended with exit code 3: no case-0000001/none.txt"
+    assert [replay(store.path, case).differences for case in (0, 1)] == [(), ()]
