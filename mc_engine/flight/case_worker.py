@@ -165,11 +165,11 @@ class Worker:
         else:
             result = self._called(_read, dict(inputs), case, order.history)  # a copy, which the function may change
         for stream_ in (sys.stdout, sys.stderr):
-            with suppress(ValueError):  # of one that the function closed
+            with suppress(ValueError, AttributeError):  # of one that the function closed or replaced
                 stream_.flush()
         keep = None if order.keep is None else Path(order.keep)
         settle(self._simulator.keep, self._work, name, result.status, keep, inputs)
-        _empty_streams()
+        _renew_streams()
         return result
 
     def _batch(self, order: Order) -> Any:
@@ -180,7 +180,7 @@ class Worker:
             return self._called(_read_batch, inputs, cases, order)
         finally:
             shutil.rmtree(self._work / folder_name(int(order.noise[0])), ignore_errors=True)
-            _empty_streams()
+            _renew_streams()
 
     def _called(self, read: Callable[..., Any], inputs: Mapping[str, Any], case: Any, how: Any) -> Any:
         """What `read` finds in what the function returns, or Flown with the status of what is wrong with it."""
@@ -313,12 +313,14 @@ def settle(rule: str, work: Path, name: str, status: int, keep: Path | None, inp
         shutil.rmtree(work / name, ignore_errors=True)
 
 
-def _empty_streams() -> None:
-    """Empty the files that stdout and stderr of this process go to."""
-    for descriptor in (1, 2):
+def _renew_streams() -> None:
+    """Empty the files of stdout and stderr, and give both back to this process, whatever the case did with them."""
+    for descriptor, name in ((1, "stdout"), (2, "stderr")):
         with suppress(OSError):
             if os.fstat(descriptor).st_size:
                 os.ftruncate(descriptor, 0)
+            own = getattr(sys, f"__{name}__")
+            setattr(sys, name, open(descriptor, "w", closefd=False) if own.closed else own)
 
 
 def end_of(path: Path) -> bytes:
