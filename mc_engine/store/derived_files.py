@@ -9,7 +9,7 @@ from pathlib import Path
 from mc_engine.store.counted_files import CountedFiles
 
 DERIVED, FIGURES, REPLAYS = "derived.jsonl", "report-figures", "replay"
-STRANGE = "move {1} out of the directory: nothing of that name belongs there"
+STRANGE = "move {1} out of the directory, which has no such files of its own"
 _LOCK = ".derived.lock"
 _NAMES = re.compile(
     r"report\.(?P<format>html|pdf|md|json)|footprint(?:-[0-9]{1,4})?\.(?:kml|geojson)"

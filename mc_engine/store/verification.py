@@ -39,9 +39,9 @@ from mc_engine.store.writer_lock import LOCK_NAME, holder, is_left_by_dead
 # Remedies of damage: {0} stands for the directory, and {1} for the files.
 REPAIR = "`mc-engine resume {0} --repair` flies bad parts again, and removes what does not count"
 ORIGINAL = "put back the original of {1}, or fetch a copy of the run; without it no repair can fly anything again"
-IN_THE_WAY = "move {1} out of the run, then `mc-engine resume {0} --repair`: no writer can go on with it in its way"
+IN_THE_WAY = "move {1} out of the run, then `mc-engine resume {0} --repair`: until then no writer can go on"
 RESUME = "left by an interrupted writer; the next `resume` removes it, and flies the rest"  # no damage
-AWAY = "move {1} out of the run: whatever reads its folder takes it for cases"
+AWAY = "move {1} out of the run: all that lies in its folder of cases is read as cases"
 UPDATE = "update mc-engine, and verify again: whether anything is damaged is not known"
 AGAIN = "put back the original of {1}, or let `mc-engine %s` make the result again, in another folder"
 _SESSION = ("started", "rerun", "finished", "interrupted")
