@@ -161,10 +161,11 @@ class SimulatorFlyer(Flyer):
             lines.append("no time histories are saved, because the simulator declares no outputs")
         cores = os.cpu_count() or 1
         workers = min(cores, self.most_workers or cores)
-        whole = seconds * self._campaign.cases / workers
+        whole = seconds * -(-self._campaign.cases // workers)  # a worker flies a case alone
         takes = about(whole / 3600.0, "hours") if whole > _FEW_MINUTES else about(whole, "s")
         lines.append(
-            f"{seconds:.3g} s a case, {takes} for {self._campaign.cases:,} cases on {counted(workers, 'worker')}"
+            f"{seconds:.3g} s a case, {takes} for {counted(self._campaign.cases, 'case')} on "
+            f"{counted(workers, 'worker')}"
         )
         return lines
 

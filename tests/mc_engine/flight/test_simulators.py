@@ -1,6 +1,7 @@
 """Simulators under a campaign file: each kind gives the same numbers, and keeps the promises of a run."""
 
 import json
+import re
 import subprocess
 import sys
 
@@ -63,7 +64,7 @@ def test_backends_and_more_cases_change_nothing(tmp_path, flown):
 
 def test_check_tells_what_a_simulator_lacks(tmp_path, monkeypatch):
     fault = "import os, time\ntime.sleep(0.3)\ninputs['mass_kg'] *= 1.0 + int.from_bytes(os.urandom(1), 'big') / 256.0"
-    file = python_campaign(tmp_path / "ball", fault=fault)
+    file = python_campaign(tmp_path / "ball", cases=1, fault=fault)
     source = file.with_name("sim.py")
     source.write_text(source.read_text().replace('outputs=outputs(speed_m_s="speed"),', ""))
     monkeypatch.setattr(before_flight, "_LONG", 0.1)
@@ -73,6 +74,7 @@ def test_check_tells_what_a_simulator_lacks(tmp_path, monkeypatch):
     assert "differ between two flights of a case; draw from case.rng or case.seed, or `replay` finds" in said.stdout
     assert "no time histories are saved, because the simulator declares no outputs" in said.stdout
     assert "not saved, as no declared outputs: the columns speed_m_s of the history" in said.stdout
+    assert re.search(r" s a case, 0\.[3-9]\d* s for 1 case on ", said.stdout)  # which no second worker shares
 
 
 def test_draws_of_a_case_are_its_own(tmp_path):
