@@ -12,12 +12,17 @@ import os
 import shutil
 import signal
 import sys
+import time
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 _PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
 _MIB = 2**20
 _SET_PARENT_SIGNAL, _SET_SUBREAPER = 1, 36  # of prctl
+_PARENT_DIED = signal.SIGUSR1  # sent by the system to a process whose parent has died, which then ends what it began
+HELD_S = 2.0  # longer than the engine needs to end its processes
 _LINUX = sys.platform.startswith("linux")
 
 
@@ -117,15 +122,27 @@ def adopt_orphans() -> None:
         ctypes.CDLL(None).prctl(_SET_SUBREAPER, 1)
 
 
-def die_with_parent(parent: int, by: int) -> None:
-    """Have this process end by the signal `by` when its parent dies, even in code that lets no Python run."""
+def die_with_parent(parent: int, end: Callable[[int, Any], None] | None = None) -> None:
+    """Have this process end when its parent dies: by `end`, a handler, or at once, in code that lets no Python run."""
     if _LINUX:
-        ctypes.CDLL(None).prctl(_SET_PARENT_SIGNAL, by)
+        if end is not None:
+            signal.signal(_PARENT_DIED, end)
+        ctypes.CDLL(None).prctl(_SET_PARENT_SIGNAL, signal.SIGKILL if end is None else _PARENT_DIED)
         if os.getppid() != parent:  # it died before
             os._exit(1)
 
 
-def let_forks_be_terminated() -> None:
+def hold_when_terminated() -> None:
+    """From now on, SIGTERM holds this process up for a while, but does not end it.
+
+    Who ends a job signals all of its processes.  The engine, which has the signal too, ends this one meanwhile: so
+    nothing is recorded of a case that was ended with the job.
+    """
+    signal.signal(signal.SIGTERM, lambda *_: time.sleep(HELD_S))
+    _let_forks_be_terminated()
+
+
+def _let_forks_be_terminated() -> None:
     """From now on, processes that this one forks end by SIGTERM, whatever handler this one has.
 
     Python forgets a signal for its handlers that comes while a process is forked, and a pool waits for a process that
@@ -148,26 +165,26 @@ def _guard(parent: int, descriptor: int, folder: Path) -> int:
     """The process number of the guard: in a child of this process, which goes on; the guard itself never returns.
 
     It ends when its child has ended, in the same way, or by SIGHUP, also while code in the child lets no Python run;
-    then no process is left that the child began.  It ends with its parent, too, by SIGTERM, and removes the folder.
+    then no process is left that the child began.  It ends with its parent, too, and removes the folder.
     descriptor : of the child alone.
     """
     adopt_orphans()
     guard = os.getpid()
     child = os.fork()
     if not child:
-        die_with_parent(guard, signal.SIGKILL)
+        die_with_parent(guard)
         return guard
 
     def end(by: int, _: object) -> None:
         end_children(set())
-        if by == signal.SIGTERM:
+        if by == _PARENT_DIED:
             shutil.rmtree(folder, ignore_errors=True)
         os._exit(1)
 
     os.close(descriptor)
-    for by in (signal.SIGHUP, signal.SIGTERM):
-        signal.signal(by, end)
-    die_with_parent(parent, signal.SIGTERM)
+    signal.signal(signal.SIGHUP, end)
+    hold_when_terminated()
+    die_with_parent(parent, end)
     code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     end_children(set())
     if code < 0:

@@ -28,7 +28,7 @@ from mc_engine.flight.program_flight import Flown, ProgramFlight, flown, in_time
 from mc_engine.model.faults import fault_of
 from mc_engine.model.simulator import Refuse, Simulator, load_simulator
 from mc_engine.model.sources import leave_importable
-from mc_engine.process_tree import adopt_orphans, die_with_parent, end_children, let_forks_be_terminated, own_children
+from mc_engine.process_tree import adopt_orphans, die_with_parent, end_children, hold_when_terminated, own_children
 from mc_engine.sampling.streams import stream
 from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, NOT_FINITE, OK, REFUSED
 from mc_engine.store.case_rows import MOST_KEPT, RowLog, keep_case
@@ -348,9 +348,8 @@ def _end_at_once(*_: Any) -> None:
 
 def _prepare_process(work: Path, parent: int, memory_mib: float | None, of_program: bool) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes of a terminal; the parent decides
-    signal.signal(signal.SIGTERM, _end_at_once)
-    let_forks_be_terminated()
-    die_with_parent(parent, signal.SIGTERM if of_program else signal.SIGKILL)
+    hold_when_terminated()
+    die_with_parent(parent, _end_at_once if of_program else None)
     adopt_orphans()
     threading.Thread(target=_end_with, args=(parent, work), daemon=True).start()
     if memory_mib is not None and sys.platform.startswith("linux"):
