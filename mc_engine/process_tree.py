@@ -22,7 +22,7 @@ _PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
 _MIB = 2**20
 _SET_PARENT_SIGNAL, _SET_SUBREAPER = 1, 36  # of prctl
 _PARENT_DIED = signal.SIGUSR1  # sent by the system to a process whose parent has died, which then ends what it began
-HELD_S = 2.0  # longer than the engine needs to end its processes
+HELD_S = 5.0  # longer than the engine needs to end its processes
 _LINUX = sys.platform.startswith("linux")
 
 

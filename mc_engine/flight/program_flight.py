@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 PROGRAM_ID = "program_id"  # file with the process group of the program in flight, for whoever must end it
 BOUNDED_S, TEMPLATE_MIB = 10.0, 2048  # that a template or a pattern may take for one case
+JOB_ENDS_S = 0.2  # in which all processes of a job that is ended have SIGTERM: this one is then held up, and ended
 LOOK_EVERY_S = 0.02  # between two looks at the memory of a program, and whether it has ended
 MOST_STDOUT, MOST_STDERR, MOST_RESULT = 2**24, 2**16, 2**26  # bytes
 _MIB, _LINUX = 2**20, sys.platform.startswith("linux")
@@ -172,6 +173,8 @@ class ProgramFlight:
             return MEMORY_LIMIT, f"needed more than {most:g} MiB"
         if ended.code == 0:
             return None
+        if ended.code == -signal.SIGTERM:
+            time.sleep(JOB_ENDS_S)
         return CRASHED, f"{how_it_ended(ended.code)}{last_lines(ended.stderr)}"
 
     def _results(self, folder: Path, stdout: bytes, inputs: Mapping[str, Any], history: bool) -> Flown:

@@ -7,15 +7,17 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from contextlib import suppress
 
 import numpy as np
 import psutil
 import pytest
 from trapped import ENVIRONMENT, campaign_folder
 
-from mc_engine import open_store
+from mc_engine import open_store, resume
 from mc_engine.runner import runner
 from mc_engine.store.verification import damage
+from tests.mc_engine.flight.falling_ball import program_campaign, python_campaign
 
 CASES = 3200  # sixteen chunks for two workers
 GONE_WITHIN_S = 20.0
@@ -178,3 +180,28 @@ def test_no_worker_outlives_a_killed_run(tmp_path, backend, record_property):
     assert_gone(processes)
     record_property("workers", len(processes) - 1)
     record_property("seconds till all were gone", time.monotonic() - begun)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere processes have no guard")
+@pytest.mark.parametrize("kind", ["function", "program"])
+def test_a_job_that_is_ended_records_no_case_as_crashed(tmp_path, kind):
+    """SIGTERM to all processes of a job, as systemd and SLURM send it: the engine has it some instants after cases."""
+    starts = tmp_path / "starts"
+    if kind == "function":
+        fault = f"import time\ntime.sleep(0.1)\nwith open({str(starts)!r}, 'a') as file: print(case.id, file=file)"
+        file = python_campaign(tmp_path / "ball", cases=40, fault=fault)
+    else:
+        count = f'usleep(100000); file = fopen("{starts}", "a"); fprintf(file, "%ld\\n", id); fclose(file);'
+        file = program_campaign(tmp_path / "ball", cases=40, fault=count)
+    words = ["run", file, "--out", tmp_path / "run", "--no-report", "--workers", "2"]
+    engine = subprocess.Popen([sys.executable, "-m", "mc_engine", *words], stdout=subprocess.DEVNULL)
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end and not (starts.exists() and starts.read_text().count("\n") > 8):
+        time.sleep(0.01)
+    for process in psutil.Process(engine.pid).children(recursive=True)[::-1]:  # the youngest first
+        with suppress(psutil.NoSuchProcess):
+            process.terminate()
+    time.sleep(0.3)
+    engine.terminate()
+    assert engine.wait(30.0) == 4
+    assert set(resume(tmp_path / "run", workers=2).cases()["status"]) == {"ok"}

@@ -7,7 +7,6 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -322,39 +321,6 @@ def test_a_killed_engine_leaves_neither_the_programs_of_a_function_nor_its_folde
         time.sleep(0.05)
     assert running("sleep\0004323") == []
     assert os.listdir(tmp_path / "temporary") == []
-
-
-def below(pid):
-    """The processes that a process began, directly or not, the youngest first."""
-    children = [
-        int(child) for file in Path(f"/proc/{pid}/task").glob("*/children") for child in file.read_text().split()
-    ]
-    return [*(process for child in children for process in below(child)), *children]
-
-
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
-@pytest.mark.parametrize("kind", ["function", "program"])
-def test_a_job_that_is_ended_records_no_case_as_crashed(tmp_path, kind):
-    """SIGTERM to all processes of a job, as systemd and SLURM send it: the engine has it some instants after cases."""
-    starts = tmp_path / "starts"
-    if kind == "function":
-        fault = f"import time\ntime.sleep(0.1)\nwith open({str(starts)!r}, 'a') as file: print(case.id, file=file)"
-        file = python_campaign(tmp_path / "ball", cases=40, fault=fault)
-    else:
-        count = f'usleep(100000); file = fopen("{starts}", "a"); fprintf(file, "%ld\\n", id); fclose(file);'
-        file = program_campaign(tmp_path / "ball", cases=40, fault=count)
-    words = ["run", file, "--out", tmp_path / "run", "--no-report", "--workers", "2"]
-    engine = subprocess.Popen([sys.executable, "-m", "mc_engine", *words], stdout=subprocess.DEVNULL)
-    end = time.monotonic() + 60.0
-    while time.monotonic() < end and not (starts.exists() and starts.read_text().count("\n") > 8):
-        time.sleep(0.01)
-    for pid in below(engine.pid):
-        with suppress(ProcessLookupError):
-            os.kill(pid, signal.SIGTERM)
-    time.sleep(0.3)
-    engine.terminate()
-    assert engine.wait(30.0) == 4
-    assert set(resume(tmp_path / "run", workers=2).cases()["status"]) == {"ok"}
 
 
 def more_kills():
