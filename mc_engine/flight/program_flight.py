@@ -134,10 +134,7 @@ class ProgramFlight:
         assert process.stderr is not None
         limit, begin, streams = OK, time.monotonic(), {"stdout": bytearray(), "stderr": bytearray()}
         with selectors.DefaultSelector() as selector, process.stdout, process.stderr:
-            for name, pipe, most in (
-                ("stdout", process.stdout, MOST_STDOUT),
-                ("stderr", process.stderr, MOST_STDERR),
-            ):
+            for name, pipe, most in (("stdout", process.stdout, MOST_STDOUT), ("stderr", process.stderr, MOST_STDERR)):
                 os.set_blocking(pipe.fileno(), False)
                 selector.register(pipe, selectors.EVENT_READ, (streams[name], most))
             while True:
