@@ -1,10 +1,9 @@
 """Interruption by Ctrl-C or SIGTERM.
 
 While cases fly, the first signal lets the chunks in flight complete, or gives up cases in flight that may take long,
-and the second one stops at once.  At any other
-time the first signal ends the command, and the second one the process.  The exit status is INTERRUPTED, and the message
-names the command that continues.  This module imports very little, so that the command line can install its handlers
-before it loads the rest.
+and the second one stops at once.  At any other time the first signal ends the command, and the second one the process.
+The exit status is INTERRUPTED, and the message names the command that continues.  This module imports very little, so
+that the command line can install its handlers before it loads the rest.
 
 Python runs signal handlers in its main thread, between two bytecodes.  A kernel or the compiler would delay them, so
 the main thread of a command leaves both to other threads, a worker pool or `in_threads`, and waits.

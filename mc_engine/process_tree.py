@@ -9,9 +9,11 @@ foreign code, the `main` of the module: it ends with it whatever that began, als
 
 import ctypes
 import os
+import re
 import shutil
 import signal
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from importlib import import_module
@@ -21,9 +23,11 @@ from typing import Any
 _PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
 _MIB = 2**20
 _SET_PARENT_SIGNAL, _SET_SUBREAPER = 1, 36  # of prctl
-_PARENT_DIED = signal.SIGUSR1  # sent by the system to a process whose parent has died, which then ends what it began
 HELD_S = 5.0  # longer than the engine needs to end its processes
 _LINUX = sys.platform.startswith("linux")
+# sent by the system to a process whose parent has died, which then ends what it began; no job manager sends it
+_PARENT_DIED = getattr(signal, "SIGRTMIN", 0) + 3
+WORK = "mc-engine-"  # how the names of the folders begin in which processes of cases work
 
 
 def how_it_ended(code: int) -> str:
@@ -41,6 +45,11 @@ def last_lines(stderr: bytes) -> str:
     """The last three lines of what was written to stderr, to be put at the end of a sentence."""
     lines = [line.strip() for line in stderr.decode(errors="replace").splitlines() if line.strip()]
     return f": {' | '.join(lines[-3:])}" if lines else ""
+
+
+def without_work(text: str) -> str:
+    """The text without the folders in which processes of cases work: each has another name every time."""
+    return re.sub(rf"{re.escape(os.path.join(tempfile.gettempdir(), WORK))}\w{{8}}/", "", text)
 
 
 def memory_mib(pid: int) -> float:

@@ -329,7 +329,7 @@ def _message(section: type[Section] | None, details: ErrorDetails) -> str:
             return f"{shown(value)} is not known{hint(value, allowed)}"
         return f"{shown(value)} is not one of {listed(allowed)}"
     whole = ""
-    if kind == "int_type" and isinstance(value, float) and value.is_integer():
+    if kind == "int_type" and isinstance(value, float) and value.is_integer() and isinstance(location[-1], str):
         least, most = _range_of(section, location)
         if least <= value <= most:
             whole = f"; write {int(value)}"

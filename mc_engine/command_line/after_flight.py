@@ -276,8 +276,8 @@ def echo_publication(folder: Path, url: str) -> None:
     except StoreError as error:
         if isinstance(error, UsageError) or not str(error).startswith(url):  # of the request, or of the run itself
             raise
-        again = f"`mc-engine publish {shell_word(folder)} {shell_word(url)}`"
-        raise StoreError(f"{error}; the run is safe, {again} sends the rest") from error
+        again = f", `mc-engine publish {shell_word(folder)} {shell_word(url)}` sends the rest"
+        raise StoreError(f"{error}; the run is safe{'' if 'publish again' in str(error) else again}") from error
     files = counted(len(done.sent), "file")
     typer.echo(f"published    {done.url}: {files}, {done.sent_bytes:,} bytes; {done.kept} were there")
 

@@ -25,7 +25,7 @@ from mc_engine.errors import DiskError, ModelError, StoreError
 from mc_engine.flight.case_worker import STDERR, STDOUT, Order, Setup, end_of
 from mc_engine.flight.flyer import RunStopped
 from mc_engine.flight.program_flight import end_noted
-from mc_engine.process_tree import how_it_ended, last_lines
+from mc_engine.process_tree import WORK, how_it_ended, last_lines
 from mc_engine.safe_path import safe_environment
 from mc_engine.status import CRASHED, TIME_LIMIT
 
@@ -53,7 +53,7 @@ class CaseProcess:
     """One process, with a temporary folder for its cases."""
 
     def __init__(self, setup: Setup):
-        self.work = Path(tempfile.mkdtemp(prefix="mc-engine-"))
+        self.work = Path(tempfile.mkdtemp(prefix=WORK))
         ours, theirs = socket.socketpair()
         try:
             with _lock:

@@ -136,6 +136,7 @@ class Worker:
         elif self._simulator.start is not None:
             self._shared = self._simulator.start()
         self._before = own_children()  # which `start` may have begun, and which live on
+        self._streams = {1: ("stdout", sys.stdout), 2: ("stderr", sys.stderr)}  # which it may have replaced
         self._folder = os.open(".", os.O_RDONLY)  # in which every case begins, wherever the one before it went
 
     def fly(self, order: Order, reply: Callable[[Any], None]) -> None:
@@ -169,7 +170,7 @@ class Worker:
                 stream_.flush()
         keep = None if order.keep is None else Path(order.keep)
         settle(self._simulator.keep, self._work, name, result.status, keep, inputs)
-        _renew_streams()
+        _renew_streams(self._streams)
         return result
 
     def _batch(self, order: Order) -> Any:
@@ -180,7 +181,7 @@ class Worker:
             return self._called(_read_batch, inputs, cases, order)
         finally:
             shutil.rmtree(self._work / folder_name(int(order.noise[0])), ignore_errors=True)
-            _renew_streams()
+            _renew_streams(self._streams)
 
     def _called(self, read: Callable[..., Any], inputs: Mapping[str, Any], case: Any, how: Any) -> Any:
         """What `read` finds in what the function returns, or Flown with the status of what is wrong with it."""
@@ -313,14 +314,15 @@ def settle(rule: str, work: Path, name: str, status: int, keep: Path | None, inp
         shutil.rmtree(work / name, ignore_errors=True)
 
 
-def _renew_streams() -> None:
-    """Empty the files of stdout and stderr, and give both back to this process, whatever the case did with them."""
-    for descriptor, name in ((1, "stdout"), (2, "stderr")):
+def _renew_streams(streams: Mapping[int, tuple[str, Any]]) -> None:
+    """Empty the files of stdout and stderr, and give both, by file descriptor, back to this process after a case."""
+    for descriptor, (name, own) in streams.items():
         with suppress(OSError):
             if os.fstat(descriptor).st_size:
                 os.ftruncate(descriptor, 0)
-            own = getattr(sys, f"__{name}__")
-            setattr(sys, name, open(descriptor, "w", closefd=False) if own.closed else own)
+            if getattr(own, "closed", False):
+                own = open(descriptor, "w", buffering=1, errors="backslashreplace", closefd=False)
+            setattr(sys, name, own)
 
 
 def end_of(path: Path) -> bytes:

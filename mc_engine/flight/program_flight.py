@@ -24,7 +24,7 @@ import numpy as np
 from mc_engine.model.program import JSON_INPUT, template_environment
 from mc_engine.model.simulator import Simulator
 from mc_engine.numbers_in_text import counted, is_number
-from mc_engine.process_tree import end_children, how_it_ended, kill_group, last_lines, memory_mib
+from mc_engine.process_tree import end_children, how_it_ended, kill_group, last_lines, memory_mib, without_work
 from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, NOT_FINITE, OK, STATUS_NAME, TIME_LIMIT
 from mc_engine.text import clean
 
@@ -37,7 +37,6 @@ JOB_ENDS_S = 0.2  # in which all processes of a job that is ended have SIGTERM: 
 LOOK_EVERY_S = 0.02  # between two looks at the memory of a program, and whether it has ended
 MOST_STDOUT, MOST_STDERR, MOST_RESULT = 2**24, 2**16, 2**26  # bytes
 _MIB, _LINUX = 2**20, sys.platform.startswith("linux")
-_WORK = re.compile(r"[^\s'\"]*/mc-engine-\w{8}/")  # the folder of a worker, which is another one each time
 
 
 class Flown(NamedTuple):
@@ -58,7 +57,7 @@ class Flown(NamedTuple):
 def flown(
     status: int, reason: str, metrics: dict[str, float] | None = None, history: dict[str, np.ndarray] | None = None
 ) -> Flown:
-    return Flown(status, clean(" ".join(_WORK.sub("", reason).split()))[:600], metrics or {}, history or {})
+    return Flown(status, clean(" ".join(without_work(reason).split()))[:600], metrics or {}, history or {})
 
 
 @dataclass

@@ -21,6 +21,7 @@ from mc_engine.lanes.tuples import add_scaled, joined, map_fields, spread, total
 Instant = namedtuple("Instant", "t s m k senses rates values")
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 6.0
+_FLAT = 1e-8  # of a value: above the rounding of its rate, which is taken over 1e-5 of a step
 DAMPING = 0.01  # weight of the second error estimate, Hairer's DOP853
 
 
@@ -167,11 +168,13 @@ def is_lost(kind, value):
 def arm(kind, sense0, value0, sense1, value1, best, h):
     """1 where a crossing counts; a peak counts if its top may beat the best so far.
 
-    Where the tangents meet within the step they bound the top; elsewhere the hill is not bent one way: nothing does.
+    Where the tangents meet within the step they bound the top; elsewhere the hill is not bent one way, and nothing
+    does, but a hill that is flat beside its value is one of rounding.
     """
     hill = (sense0 > 0.0) & (sense1 < 0.0)
     x = (value1 - value0 - sense1 * h) / where(hill, sense0 - sense1, 1.0)
-    promising = hill & ((value0 + sense0 * x > best) | (x < 0.0) | (x > h))
+    steep = (sense0 - sense1) * h > _FLAT * maximum(abs(value0), abs(value1))
+    promising = hill & ((value0 + sense0 * x > best) | (((x < 0.0) | (x > h)) & steep))
     return where(kind == PEAK, where(promising, 1.0, 0.0), where(kind == CORNER, 0.0, 1.0))
 
 

@@ -51,7 +51,7 @@ _FUNCTIONS = {"sqrt": "the square root", "log": "the logarithm", "asin": "the ar
               "tan": "the tangent", "exp": "the exponential"}  # fmt: skip
 _ENGINE = Path(__file__).resolve().parents[1]
 _PYTHON = Path(sysconfig.get_path("stdlib")).resolve()
-_OF_0_1 = "a model of version 0.1 is written so; CHANGELOG.md says under 0.2.0 how to convert it"
+_OF_0_1 = "CHANGELOG.md says under 0.2.0 how to convert a model of version 0.1"
 _SAID_OF_0_1 = {"Field": "positional", "Parameter": "multiple values", "Setting": "multiple values"}  # by Python
 _LONG = 60  # characters of a source line in a sentence
 

@@ -12,6 +12,8 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from mc_engine.errors import ModelError
 from mc_engine.model.fields import Field, Parameter, Setting, inputs_of
 from mc_engine.model.figures import Figure
@@ -24,9 +26,10 @@ if TYPE_CHECKING:
     from mc_engine.model.program import Program
 
 KEPT = ("none", "failed", "all")  # of the folders of cases
+_TRUTH = bool | np.bool_
 _KINDS: dict[str, tuple[Any, str]] = {
     **dict.fromkeys(("title", "name", "source"), (str, "text")),
-    **dict.fromkeys(("batch", "deterministic"), (bool, "True or False")),
+    **dict.fromkeys(("batch", "deterministic"), (_TRUTH, "True or False")),
     **dict.fromkeys(("time_limit_s", "memory_limit_mib"), (Real | None, "a number")),
     "slots": (Integral | None, "a whole number"),
     "tolerance": (Real, "a number"),
@@ -126,7 +129,7 @@ class Simulator:
         object.__setattr__(self, "settings", (*self.settings, *shared))
         for name, (kind, words) in _KINDS.items():
             value = getattr(self, name)
-            if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+            if not isinstance(value, kind) or (isinstance(value, bool) and kind is not _TRUTH):
                 raise ModelError(f"the simulator has {value!r} as its `{name}`; it must be {words}")
         refuse_false_simulator(self)
         if self.keep not in KEPT:

@@ -39,7 +39,7 @@ from mc_engine.store.repair import mend_journal, withdraw_damaged
 from mc_engine.store.run_files import JOURNAL, NOMINAL_CASE, SENSITIVITY, is_run_directory
 from mc_engine.store.store import Store, create_store
 
-_OF_A_CLUSTER = 512  # workers that a scheduler may have
+_OF_A_CLUSTER = 64  # workers, at least, for which the cases of a scheduler are cut: each part takes its time
 _LOOK_SELDOM = 20.0  # times what a look at the recorded rows takes, until the next one
 
 Done = Sequence[tuple[Task, Written]]  # what tasks wrote
@@ -223,7 +223,7 @@ def _run_tasks(
             look = time.perf_counter()
             rows, lost = rows_so_far(store.path) if leaves else (0, 0)
             next_look_s = look + _LOOK_SELDOM * (time.perf_counter() - look)
-            if (done + rows, failed + lost) != told:
+            if done + rows >= told[0] and (done + rows, failed + lost) != told:  # a part may be behind its rows
                 told = done + rows, failed + lost
                 report(told[0], total, told[1])
 

@@ -8,7 +8,7 @@ import numpy as np
 from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.drawing.marks import Drawing, Plot
 from reports.figures.rows import single_change_panel
-from reports.run.flown import Flown
+from reports.run.flown import ROUNDING, Flown
 from reports.text.numbers import axis_label, count, exact, number, with_unit
 
 MOST_METRICS = 8
@@ -29,21 +29,22 @@ class SingleChanges:
     change: np.ndarray
 
     @property
+    def known(self) -> np.ndarray:
+        """bool[n_levels]: where the metric has a number."""
+        return np.isfinite(self.change)
+
+    @property
+    def moves(self) -> bool:
+        """Whether a level is known to move the metric."""
+        return bool(self.change[self.known].any())
+
+    @property
     def size(self) -> float:
-        return max(self.fall[0], self.rise[0], key=abs)
+        return max(abs(self.change[self.known]).tolist(), default=0.0)
 
-    @property
-    def fall(self) -> tuple[float, str]:
-        """The largest change downwards, at most 0, and its level."""
-        return self._furthest(-1.0)
-
-    @property
-    def rise(self) -> tuple[float, str]:
-        """The largest change upwards, at least 0, and its level."""
-        return self._furthest(1.0)
-
-    def _furthest(self, sign: float) -> tuple[float, str]:
-        place = int(np.argmax(np.nan_to_num(sign * self.change, nan=-np.inf)))
+    def furthest(self, sign: float) -> tuple[float, str]:
+        """The largest change upwards (sign 1) or downwards (-1), and its level; 0 where none moves the metric so."""
+        place = int(np.argmax(np.where(self.known, sign * self.change, -np.inf)))
         change = float(self.change[place])
         return (change, self.levels[place]) if sign * change > 0.0 else (0.0, "")
 
@@ -52,16 +53,16 @@ def single_change_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
     """A figure and a table of the metrics that matter; a sentence for those of which nothing is known."""
     cases = _cases_by_input(flown)
     found = {metric: _changes(flown, metric, cases) for metric in flown.key_metrics[:MOST_METRICS]}
-    told = {metric: changes for metric, changes in found.items() if any(row.size for row in changes)}
+    told = {metric: rows for metric, rows in found.items() if any(row.moves for row in rows)}
     if told:
         panels = tuple(_panel(flown, metric, changes) for metric, changes in told.items())
         caption = "Change of each metric by one input alone, from the case with all inputs nominal."
         yield FigureBlock(caption, Drawing("Changes by one input alone", panels), "half")
         yield _table(flown, told)
-    same = [metric for metric, changes in found.items() if changes and metric not in told]
+    same = [metric for metric, rows in found.items() if metric not in told and any(row.known.any() for row in rows)]
     if same:
-        yield f"No input alone changes {flown.listed(same)}."
-    unknown = [metric for metric, changes in found.items() if not changes]
+        yield f"No input alone changes {flown.listed(same)}, in the cases that have it."
+    unknown = [metric for metric in found if metric not in (*told, *same)]
     if unknown:
         yield (
             f"Changes of {flown.listed(unknown)} are not known: there is no number where all inputs are nominal, or "
@@ -82,13 +83,15 @@ def _changes(flown: Flown, metric: str, cases: dict[str, np.ndarray]) -> list[Si
     """What each input does to a metric, the largest change first; nothing without a number to change from."""
     values = flown.values(metric)
     nominal = values[cases[""][:1]] if "" in cases else np.full(1, np.nan)
+    nothing = ROUNDING * flown.largest_alike(metric)
     rows = []
     for name, places in cases.items():
-        change = values[places] - nominal
-        if name and np.isfinite(change).any():
+        if name:
+            change = values[places] - nominal
             levels = [flown.inputs[name].tolist()[place] for place in places.tolist()]
-            rows.append(SingleChanges(name, tuple(_in_words(level, flown.unit(name)) for level in levels), change))
-    return sorted(rows, key=lambda row: -abs(row.size))
+            words = tuple(_in_words(level, flown.unit(name)) for level in levels)
+            rows.append(SingleChanges(name, words, np.where(np.abs(change) < nothing, 0.0, change)))
+    return sorted(rows, key=lambda row: -row.size)
 
 
 def _in_words(level: float | bool | str, unit: str) -> str:
@@ -101,6 +104,10 @@ def _panel(flown: Flown, metric: str, changes: list[SingleChanges]) -> Plot:
     return single_change_panel(
         label, [flown.words(row.name) for row in shown], [(row.levels, row.change) for row in shown]
     )
+
+
+def _end_cell(change: float, level: str) -> Cell:
+    return Cell(number(change, 4), change, f"at {level}" * bool(level))
 
 
 def _table(flown: Flown, told: dict[str, list[SingleChanges]]) -> Table:
@@ -116,10 +123,8 @@ def _table(flown: Flown, told: dict[str, list[SingleChanges]]) -> Table:
         title = Cell(axis_label(flown.words(metric), flown.unit(metric)))
         left_out += len(changes[MOST_INPUTS:])
         for row in changes[:MOST_INPUTS]:
-            used = f"{count(int(np.isfinite(row.change).sum()))}/{count(row.change.size)}"
-            ends = [
-                Cell(number(change, 4), change, f"at {level}" * bool(level)) for change, level in (row.fall, row.rise)
-            ]
+            used = f"{count(int(row.known.sum()))}/{count(row.known.size)}"
+            ends = [_end_cell(*row.furthest(sign)) if row.known.any() else Cell("–") for sign in (-1.0, 1.0)]
             rows.append((title, Cell(flown.words(row.name)), *ends, Cell(used)))
     note = _NOTE + f" {count(left_out)} smaller ones are not shown." * bool(left_out)
     return Table("Changes of the metrics by one input alone", columns, tuple(rows), note)

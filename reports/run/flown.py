@@ -272,10 +272,10 @@ class Flown:
         return change / summary.spread if summary.spread > ROUNDING * self.own.largest_alike(metric) else None
 
     def largest_alike(self, metric: str) -> float:
-        """Size of the largest number among the metrics in the unit of this one; marks are no numbers of others."""
-        alike = {name: other for name, other in self.summaries.items() if self.unit(name) == self.unit(metric)}
-        ends = [(name, abs(end)) for name, other in alike.items() for end in (other.minimum, other.maximum) if end]
-        return max((size for name, size in ends if size < MARK or name == metric), default=0.0)
+        """Size of the largest number, but for marks, among the metrics in the unit of this one."""
+        alike = [other for name, other in self.summaries.items() if self.unit(name) == self.unit(metric)]
+        ends = [abs(end) for other in alike for end in (other.minimum, other.maximum) if end is not None]
+        return max((end for end in ends if end < MARK), default=0.0)
 
     @cached_property
     def key_metrics(self) -> list[str]:

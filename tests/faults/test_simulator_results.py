@@ -1,6 +1,8 @@
 """What simulators give that is no number and no history: such a case has no result, and the reason says why."""
 
 import re
+import tempfile
+import time
 
 import pytest
 
@@ -97,3 +99,12 @@ def test_the_reason_of_a_case_is_the_same_whichever_folder_its_worker_has(tmp_pa
     assert store.row(0)["reason"] == missing
     assert store.row(1)["reason"] == "ended with exit code 3: no case-0000001/none.txt"
     assert [replay(store.path, case).differences for case in (0, 1)] == [(), ()]
+
+
+def test_a_reason_keeps_all_folders_but_that_of_the_worker_and_takes_no_time():
+    begun = time.monotonic()
+    assert program_flight.flown(1, 60_000 * "x").reason == 600 * "x"  # 36 s where each letter may begin a folder
+    assert time.monotonic() - begun < 2.0
+    work = f"{tempfile.gettempdir()}/mc-engine-abcd_123/case-7"
+    said = program_flight.flown(1, f"'{work}/a.csv' is not /opt/mc-engine-releases/a.csv").reason
+    assert said == "'case-7/a.csv' is not /opt/mc-engine-releases/a.csv"

@@ -43,3 +43,15 @@ def test_a_run_its_status_and_its_summary_load_no_pandas(here):
     run = here / "flown"
     for arguments in (["run", "minimal", "--cases", 8, "--no-report", "--out", run], ["status", run], ["summary", run]):
         assert "pandas" not in loaded_by(*arguments)
+
+
+def test_the_engine_is_imported_where_the_system_has_no_signals_of_posix():
+    script = (
+        "import signal\n"
+        "known = {'SIGABRT', 'SIGFPE', 'SIGILL', 'SIGINT', 'SIGSEGV', 'SIGTERM'}  # of Windows\n"
+        "for name in [name for name in vars(signal) if name[:3] == 'SIG' and name[3:4].isalpha()]:\n"
+        "    if name not in known:\n"
+        "        delattr(signal, name)\n"
+        "import mc_engine.command_line.app, mc_engine.runner.runner, mc_engine.flight.simulated\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True, env=ENVIRONMENT)

@@ -103,5 +103,8 @@ def test_a_top_late_in_a_step_that_begins_flat_may_beat_the_best_so_far():
     # t^4 (5 - 4 t) + t / 1000 tops 1 between 0 and 1.1, where its tangents meet behind the step
     end, rate = 1.1**4 * 0.6 + 1.1e-3, -2.0 * 1.1**3 + 1e-3
     assert arm(PEAK, 1e-3, 0.0, rate, end, 0.9, 1.1) == 1.0
+    # the rounding of a rate beside a value that stays
+    assert arm(PEAK, 1e-11, 1.0, -3e-11, 1.0, 0.9999, 1.1) == 1.0  # beats the best so far
+    assert arm(PEAK, 1e-11, 1.0, -3e-11, 1.0 - 1e-10, 1.5, 1.1) == 0.0
     # t (1 - t) between 0 and 1: they meet at 0.5, and bound its top of 0.25
     assert [float(arm(PEAK, 1.0, 0.0, -1.0, 0.0, best, 1.0)) for best in (0.49, 0.51)] == [1.0, 0.0]

@@ -154,7 +154,7 @@ def test_a_module_beside_the_model_is_called_by_its_file(tmp_path):
 
 def test_a_model_in_the_form_of_version_0_1_is_pointed_to_the_change_log(tmp_path):
     old_form = ('altitude_km="altitude"', 'altitude_km=Field("altitude_km", "km", "altitude")')
-    sentence = "; a model of version 0.1 is written so; CHANGELOG.md says under 0.2.0 how to convert it"
+    sentence = "; CHANGELOG.md says under 0.2.0 how to convert a model of version 0.1"
     refused(tmp_path, [("import Event,", "import Event, Field,"), old_form], sentence, "Outputs = outputs(")
 
 
@@ -162,7 +162,7 @@ def test_a_model_in_the_form_of_version_0_1_is_pointed_to_the_change_log(tmp_pat
     "record", ['Parameter("mass_kg", "kg", "mass", 1.0, low=0.0)', 'Setting("law", "", "law", "a", choices=("a",))']
 )
 def test_inputs_in_the_form_of_version_0_1_are_pointed_to_the_change_log(tmp_path, record):
-    sentence = "CHANGELOG.md says under 0.2.0 how to convert it"
+    sentence = "CHANGELOG.md says under 0.2.0 how to convert a model of version 0.1"
     refused(
         tmp_path, [(IMPORTS, f"from mc_engine.model import Parameter, Setting\n\nOLD = {record}\n{IMPORTS}")], sentence
     )

@@ -95,7 +95,7 @@ def test_one_at_a_time_tells_what_each_input_does_alone():
     run.table["pulse_count"] = 4.0
     figure, table, same = section(run)
     assert isinstance(figure, FigureBlock)
-    assert same.paragraphs == ("No input alone changes pulse count.",)
+    assert same.paragraphs == ("No input alone changes pulse count, in the cases that have it.",)
     rows = [row for row in table.rows if row[0].text == "entry speed [m/s]"]
     said = [tuple((cell.text, cell.small.replace("\u202f", " ")) for cell in row[1:]) for row in rows]
     assert said == [
@@ -109,3 +109,14 @@ def test_one_at_a_time_without_a_nominal_number_has_no_changes():
     run.table.loc[0, "status"] = "not-finite"
     (words,) = section(run)
     assert words.paragraphs[0].startswith("Changes of propellant, ")
+
+
+def test_an_input_without_a_number_keeps_its_row_and_rounding_is_no_change():
+    run = one_at_a_time()
+    run.table.loc[[4, 5], "status"] = "not-finite"
+    run.table["propellant_kg"] = 1.5 + 1e-14 * run.table["case_id"]
+    blocks = section(run)
+    (table,) = [block for block in blocks if isinstance(block, Table)]
+    (row,) = [row for row in table.rows if row[0].text == "peak force [N]" and row[1].text == "oe"]
+    assert [cell.text for cell in row[2:]] == ["–", "–", "0/2"]
+    assert "No input alone changes propellant" in blocks[-1].paragraphs[0]
