@@ -183,8 +183,10 @@ def test_no_worker_outlives_a_killed_run(tmp_path, backend, record_property):
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere processes have no guard")
-@pytest.mark.parametrize("kind", ["function", "program"])
-def test_a_job_that_is_ended_records_no_case_as_crashed(tmp_path, kind):
+@pytest.mark.parametrize(
+    ("kind", "backend"), [("function", "threading"), ("program", "threading"), ("program", "loky")]
+)
+def test_a_job_that_is_ended_records_no_case_as_crashed(tmp_path, kind, backend):
     """SIGTERM to all processes of a job, as systemd and SLURM send it: the engine has it some instants after cases."""
     starts = tmp_path / "starts"
     if kind == "function":
@@ -193,7 +195,7 @@ def test_a_job_that_is_ended_records_no_case_as_crashed(tmp_path, kind):
     else:
         count = f'usleep(100000); file = fopen("{starts}", "a"); fprintf(file, "%ld\\n", id); fclose(file);'
         file = program_campaign(tmp_path / "ball", cases=40, fault=count)
-    words = ["run", file, "--out", tmp_path / "run", "--no-report", "--workers", "2"]
+    words = ["run", file, "--out", tmp_path / "run", "--no-report", "--workers", "2", "--backend", backend]
     engine = subprocess.Popen([sys.executable, "-m", "mc_engine", *words], stdout=subprocess.DEVNULL)
     end = time.monotonic() + 60.0
     while time.monotonic() < end and not (starts.exists() and starts.read_text().count("\n") > 8):
