@@ -128,7 +128,7 @@ def wind_profile(
     wanted = [name for name in (altitude, north, east, speed, coming_from) if name]
     if len(wanted) != 3 or bool(north) != bool(east):
         raise ModelError("a wind has the columns north and east, or speed and coming_from")
-    by_name = dict.fromkeys(wanted, lambda unit: "by another name")
+    by_name = dict.fromkeys(wanted, lambda unit: "by another name" if unit else "its unit at its end, or one word,")
     h, *pair = (columns_of(path, dict.fromkeys(wanted), by_name)[name] for name in wanted)
     components = pair if north else [-pair[0] * np.cos(pair[1]), -pair[0] * np.sin(pair[1])]
     to_north, to_east = (_through(h, component, kind, outside, path) for component in components)

@@ -5,14 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reports.contributors.designed_indices import MOST_INPUTS, MOST_METRICS
 from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.drawing.marks import Drawing, Plot
 from reports.figures.rows import single_change_panel
 from reports.run.flown import ROUNDING, Flown
 from reports.text.numbers import axis_label, count, exact, number, with_unit
 
-MOST_METRICS = 8
-MOST_INPUTS = 12  # of a metric
 _NOTE = (
     "Each change is that of one case, in which this input alone is not nominal, from the case in which all are; it is "
     "0 where no level moves the metric that way. Changes may be added up only where inputs do not act together; where "
@@ -70,27 +69,35 @@ def single_change_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
         )
 
 
-def _cases_by_input(flown: Flown) -> dict[str, np.ndarray]:
-    """Rows of the table by the one input that is not nominal; those with all inputs nominal under ""."""
-    changed = np.array([values != flown.nominal.get(name) for name, values in flown.inputs.items()])
-    rows = {"": np.flatnonzero(~changed.any(axis=0))}
-    for name, differs in zip(flown.inputs, changed, strict=True):
-        rows[name] = np.flatnonzero(differs)
-    return {name: found for name, found in rows.items() if found.size}
+@dataclass(frozen=True)
+class _Cases:
+    """Rows of the table in which one input alone is not nominal, and its levels there in words."""
+
+    rows: np.ndarray
+    levels: tuple[str, ...]
 
 
-def _changes(flown: Flown, metric: str, cases: dict[str, np.ndarray]) -> list[SingleChanges]:
-    """What each input does to a metric, the largest change first; nothing without a number to change from."""
+def _cases_by_input(flown: Flown) -> dict[str, _Cases]:
+    """The cases by the one input that is not nominal; those with all inputs nominal under ""."""
+    changed = {name: values != flown.nominal.get(name) for name, values in flown.inputs.items()}
+    nominal = ~np.any([*changed.values()], axis=0)
+    cases = {"": _Cases(np.flatnonzero(nominal), ())}
+    for name, values in flown.inputs.items():
+        rows = np.flatnonzero(changed[name])
+        cases[name] = _Cases(rows, tuple(_in_words(level, flown.unit(name)) for level in values[rows].tolist()))
+    return {name: found for name, found in cases.items() if found.rows.size}
+
+
+def _changes(flown: Flown, metric: str, cases: dict[str, _Cases]) -> list[SingleChanges]:
+    """What each input does to a metric, the largest change first; NaN without a number to change from."""
     values = flown.values(metric)
-    nominal = values[cases[""][:1]] if "" in cases else np.full(1, np.nan)
+    nominal = values[cases[""].rows[:1]] if "" in cases else np.full(1, np.nan)
     nothing = ROUNDING * flown.largest_alike(metric)
     rows = []
-    for name, places in cases.items():
+    for name, found in cases.items():
         if name:
-            change = values[places] - nominal
-            levels = [flown.inputs[name].tolist()[place] for place in places.tolist()]
-            words = tuple(_in_words(level, flown.unit(name)) for level in levels)
-            rows.append(SingleChanges(name, words, np.where(np.abs(change) < nothing, 0.0, change)))
+            change = values[found.rows] - nominal
+            rows.append(SingleChanges(name, found.levels, np.where(np.abs(change) < nothing, 0.0, change)))
     return sorted(rows, key=lambda row: -row.size)
 
 

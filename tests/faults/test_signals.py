@@ -17,7 +17,7 @@ from trapped import ENVIRONMENT, campaign_folder
 from mc_engine import open_store, resume
 from mc_engine.runner import runner
 from mc_engine.store.verification import damage
-from tests.mc_engine.flight.falling_ball import program_campaign, python_campaign
+from tests.mc_engine.flight.falling_ball import noting_campaign
 
 CASES = 3200  # sixteen chunks for two workers
 GONE_WITHIN_S = 20.0
@@ -189,12 +189,7 @@ def test_no_worker_outlives_a_killed_run(tmp_path, backend, record_property):
 def test_a_job_that_is_ended_records_no_case_as_crashed(tmp_path, kind, backend):
     """SIGTERM to all processes of a job, as systemd and SLURM send it: the engine has it some instants after cases."""
     starts = tmp_path / "starts"
-    if kind == "function":
-        fault = f"import time\ntime.sleep(0.1)\nwith open({str(starts)!r}, 'a') as file: print(case.id, file=file)"
-        file = python_campaign(tmp_path / "ball", cases=40, fault=fault)
-    else:
-        count = f'usleep(100000); file = fopen("{starts}", "a"); fprintf(file, "%ld\\n", id); fclose(file);'
-        file = program_campaign(tmp_path / "ball", cases=40, fault=count)
+    file = noting_campaign(kind, tmp_path / "ball", 40, 0.1, starts)
     words = ["run", file, "--out", tmp_path / "run", "--no-report", "--workers", "2", "--backend", backend]
     engine = subprocess.Popen([sys.executable, "-m", "mc_engine", *words], stdout=subprocess.DEVNULL)
     end = time.monotonic() + 60.0

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from mc_engine import ModelError, load_campaign, resume, run
-from tests.mc_engine.flight.falling_ball import program_campaign, python_campaign
+from tests.mc_engine.flight.falling_ball import noting_campaign, program_campaign, python_campaign
 
 SAMPLE, WHOLE = (4, 50), (100, 250)  # cases with a fault, of so many: in the deep tests and in the slow ones
-SAMPLE_KILLS, WHOLE_KILLS = (("case", 3),), 50  # of the engine, after so many cases
+SAMPLE_KILLS, WHOLE_KILLS = (("function", 3),), 50  # of the engine, after so many cases
 PYTHON_FAULTS = {
     "segfault": ("import ctypes\n    ctypes.string_at(0)", "crashed", "ended by SIGSEGV at "),
     "kill": ("import os\n    os.kill(os.getpid(), 9)", "crashed", "ended by SIGKILL"),
@@ -327,7 +327,7 @@ def more_kills():
     """Of a whole test, at random instants."""
     rng = np.random.default_rng(22)
     for kill in range(WHOLE_KILLS):
-        kind, after = ("case", "program")[kill % 2], int(rng.integers(1, 118))
+        kind, after = ("function", "program")[kill % 2], int(rng.integers(1, 118))
         yield pytest.param(kind, after, marks=pytest.mark.slow, id=f"{kind}-{after}-{kill}")
 
 
@@ -340,12 +340,7 @@ def parts(folder):
 @pytest.mark.parametrize(("kind", "after"), [*SAMPLE_KILLS, *more_kills()])
 def test_a_killed_engine_resumes_without_flying_a_finished_case_twice(tmp_path, kind, after):
     starts = tmp_path / "starts"
-    if kind == "case":
-        fault = f"import time\ntime.sleep(0.03)\nwith open({str(starts)!r}, 'a') as file: print(case.id, file=file)"
-        file = python_campaign(tmp_path / "ball", cases=120, fault=fault)
-    else:
-        count = f'file = fopen("{starts}", "a"); fprintf(file, "%ld\\n", id); fclose(file); usleep(30000);'
-        file = program_campaign(tmp_path / "ball", cases=120, fault=count)
+    file = noting_campaign(kind, tmp_path / "ball", 120, 0.03, starts)
     command = [
         sys.executable,
         "-m",

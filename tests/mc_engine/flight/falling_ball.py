@@ -122,6 +122,17 @@ def python_campaign(folder, cases=100, fault="", options="", imports=""):
     return folder / "campaign.toml"
 
 
+def noting_campaign(kind, folder, cases, seconds, starts):
+    """A campaign, of a "function" or a "program", whose cases take so long and write their numbers into a file."""
+    if kind == "function":
+        fault = (
+            f"import time\ntime.sleep({seconds})\nwith open({str(starts)!r}, 'a') as file: print(case.id, file=file)"
+        )
+        return python_campaign(folder, cases=cases, fault=fault)
+    note = f'file = fopen("{starts}", "a"); fprintf(file, "%ld\\n", id); fclose(file);'
+    return program_campaign(folder, cases=cases, fault=f"usleep({round(1e6 * seconds)}); {note}")
+
+
 def program_campaign(folder, cases=100, fault="", mass="mass", limit_s=60.0):
     """A campaign of a C program, compiled in a new folder.  mass : what it says that it used."""
     folder.mkdir()

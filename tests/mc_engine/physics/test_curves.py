@@ -314,5 +314,5 @@ def test_the_argument_that_says_a_unit_is_named_as_the_function_has_it(folder):
         curve("points.csv", x="cd", y="time_sec")
     with pytest.raises(ModelError, match=r'; say units=\{"alpha_x": ""\} for a plain number'):
         surface("points.csv", "time_sec", "alpha_x", "cd", units={"time_sec": "s"})
-    with pytest.raises(ModelError, match="; say by another name for a plain number"):
+    with pytest.raises(ModelError, match="; say its unit at its end, or one word, for a plain number"):
         wind_profile("points.csv", "time_sec", "alpha_x", "cd")
