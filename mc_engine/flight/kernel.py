@@ -134,9 +134,9 @@ class Registers(NamedTuple):
 def registers() -> Registers:
     """The vector registers of this processor: 32 of AVX-512, else counted as 16 of AVX2, as NEON's 32 of half the size.
 
-    Measured (`python -m tests.benchmarks.lanes`, `mc-engine bench`) on Zen 5 and Zen 3.
+    Measured (`python -m tests.benchmarks.lanes`, `mc-engine bench`) on Zen 5, on Zen 4 without AVX-512, and on Zen 3.
     """
-    return Registers(8, 18, 12) if binding.get_host_cpu_features().get("avx512f") else Registers(4, 8, 12)
+    return Registers(8, 18, 12) if binding.get_host_cpu_features().get("avx512f") else Registers(4, 10, 11)
 
 
 def usual_width(model: Model) -> int:
