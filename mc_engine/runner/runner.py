@@ -5,6 +5,7 @@ campaign, sources, seed and case_id, and not on chunks, workers or backend.
 """
 
 import re
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 from mc_engine.campaign.cases import case_table
 from mc_engine.campaign.loading import Campaign, load_campaign, refuse_no_campaign
 from mc_engine.campaign.sections import HistoriesSection
-from mc_engine.errors import CampaignError, EngineError, Problem, StoreError
+from mc_engine.errors import CampaignError, EngineError, ModelError, Problem, StoreError
 from mc_engine.flight.chunks import name_upstream
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import in_threads
@@ -27,6 +28,7 @@ from mc_engine.runner.progress import ProgressCall
 from mc_engine.runner.sessions import Session, complete, count_of, fly_failed, session_of
 from mc_engine.runner.shards import Shard, merge_shards
 from mc_engine.sampling.designs import block_problem, extension_problem
+from mc_engine.store.case_rows import recorded_cases
 from mc_engine.store.opening import open_store
 from mc_engine.store.repair import mend_journal
 from mc_engine.store.run_files import JOURNAL, default_folder, path_of
@@ -89,7 +91,8 @@ def run(
     from another one that has yet to be flown, that one is flown first, into a directory next to `out`.
 
     Raises StoreError if `out` is occupied or a URL, and RunInterrupted on Ctrl-C or a full disk; complete chunks are
-    kept, and `resume` flies the rest.
+    kept, and `resume` flies the rest.  Raises ModelError if the model is at fault; if no case has completed, `out` is
+    removed, so that the same call flies the corrected model.
 
     >>> store = run(load_campaign("minimal", cases=8), "runs/example")
     >>> store.cases()["apogee_altitude_km"].median().round(1)
@@ -109,7 +112,12 @@ def run(
     if shard is not None:
         manifest["shard"] = shard.record(campaign.cases)
     store = create_store(path, manifest, campaign.text, columns_of(campaign), companions_of(campaign))
-    return complete(store, campaign, session)
+    try:
+        return complete(store, campaign, session)
+    except ModelError:
+        if not store.parts and not recorded_cases(store.path):  # `resume` would fly its copy of the faulty model
+            shutil.rmtree(store.path, ignore_errors=True)
+        raise
 
 
 def _after_first(campaign: Campaign, path: Path, session: Session) -> Campaign:

@@ -292,7 +292,7 @@ def test_arguments_that_nothing_can_be_flown_with_are_refused_before_a_run_is_ma
     assert not (tmp_path / "run").exists()
 
 
-def test_a_model_that_breaks_while_preparing_is_named_with_its_cases(tmp_path):
+def test_a_model_that_breaks_while_preparing_is_named_with_its_cases_and_leaves_no_run(tmp_path):
     source = (load_campaign("minimal").directory / "model.py").read_text()
     source = source.replace("initial=initial,", "prepare=prepare, initial=initial,")
     broken = "def prepare(i, o, refusals):\n    return {**vars(i), 'altitude': 1 / (i.altitude.size < 4)}\n\n\n"
@@ -301,3 +301,4 @@ def test_a_model_that_breaks_while_preparing_is_named_with_its_cases(tmp_path):
     (tmp_path / "campaign.toml").write_text(load_campaign("minimal").text)
     with pytest.raises(ModelError, match=r"cases \d+ to \d+ cannot be flown: model.py, line \d+: ZeroDivisionError"):
         runner.run(load_campaign(tmp_path, cases=100), tmp_path / "run")
+    assert not (tmp_path / "run").exists()  # so that the same command flies the corrected model
