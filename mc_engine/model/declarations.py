@@ -1,8 +1,8 @@
-"""The declarations of a model: each names its numbers once, and gives the named tuple that physics uses.
+"""The declarations of a model: its inputs, states, outputs and metrics, each declared once, with meaning and unit.
 
-The name of a number is its column; its ending tells the unit, and what is before it is the name inside physics:
-`altitude_km` is `altitude`, in metres.  A number whose name ends in no unit, or in what may be read as two, says its
-unit: Parameter(0.1, "eccentricity", unit="").
+Each declaration returns the named tuple that physics uses.  The name of a number is its column.  The ending of the name
+is the unit, and the rest is the name inside physics: `altitude_km` is `altitude` there, in metres.  If a name ends in
+no unit, or its ending fits two units, the declaration states the unit: Parameter(0.1, "eccentricity", unit="").
 """
 
 from collections import namedtuple
@@ -24,10 +24,10 @@ class Metric:
     """A metric that the engine computes: made by `maximum_of`, `at_end` and the like.
 
     source : str, "value" or "time" of an extremum, "end" or "event" for the output there
-    field : Field, the metric's column, as yet without its name
-    extremum : the output and the kind of its extreme value; None for the others
-    output : str, the output at the end or at an event; of a time, "t_s" or ""
-    event : str, the event
+    field : Field, the column of the metric, before `metrics` has given it its name
+    extremum : the output and the kind of its extreme value; None for the other sources
+    output : str, the output whose value at the end or at an event is the metric; for the time, "t_s" or ""
+    event : str, the name of the event
     """
 
     source: str
@@ -37,7 +37,7 @@ class Metric:
     event: str = ""
 
     def meaning(self, output: str) -> str:
-        """The metric in words, of the description of its output: "largest speed", "time of the smallest altitude"."""
+        """The metric in words, made from the description of its output, such as "time of the smallest altitude"."""
         if self.event:
             return f"{output} at the event {self.event}"
         if self.extremum is None:
@@ -52,12 +52,12 @@ def maximum_of(output: str, description: str = "", *, smooth: bool = True, **opt
     """The largest value of an output along the flight: metrics(top_speed_m_s=maximum_of("speed_m_s", "top speed")).
 
     output : str, the name of an output
-    description : str, one line; by default in the words of the output
-    smooth : bool, the extremum may lie between steps, on a curve through them; else it is taken at steps and events
+    description : str, one line; by default made from the description of the output
+    smooth : bool, True: the extremum may lie between steps, on a curve through them; False: only at steps and events
     options : low, high, sometimes, unit; see `Field`
 
     Returns the Metric, for `metrics`.
-    Raises TypeError for another argument.
+    Raises TypeError for any other option.
 
     >>> maximum_of("speed_m_s", "largest speed").extremum.kind
     'max'
@@ -119,8 +119,8 @@ def _extreme(kind: str, source: str, output: str, description: str, smooth: bool
 
 
 def last_above(output: str, level: float, description: str = "", **options: Any) -> Metric:
-    """The last time at which an output was above `level`: 0 where it never was, and where it still is at the end, the
-    time of the end, which a limit such as that of a settling time must lie below.
+    """The last time at which an output was above `level`, such as a settling time: 0 if it never was, and the time of
+    the end if it is still above then, so choose the limit of a requirement below the end of the flight.
 
     output, description, options : as of `maximum_of`
     level : float, in SI
@@ -151,12 +151,12 @@ def at_end(output: str, description: str = "", **options: Any) -> Metric:
 def value_at(event: str, output: str, description: str = "", **options: Any) -> Metric:
     """The value of an output where an event first crosses zero: value_at("apogee", "altitude_km", "altitude there").
 
-    Of a delayed event, where it crosses, not where it acts.  In a case without the event it is not a number, which
-    needs sometimes=True if it is so in all.
+    For a delayed event, the value at the crossing, not at the action.  In a case without the event the metric is NaN.
+    If it may be NaN in all cases, declare it with sometimes=True.
 
     event : str, the name of an event
-    output : str, the name of an output; `time_of` is for the time
-    description : str, one line; by default in the words of the output and the event
+    output : str, the name of an output; for the time use `time_of`
+    description : str, one line; by default made from the descriptions of the output and the event
     options : low, high, sometimes, unit; see `Field`
 
     Returns the Metric, for `metrics`.
@@ -173,7 +173,7 @@ def time_of(event: str, description: str = "", **options: Any) -> Metric:
     """The time at which an event first crosses zero; see `value_at`.
 
     event : str, the name of an event
-    description : str, one line; by default in the words of the output and the event
+    description : str, one line; by default made from the name of the event
     options : low, high, sometimes, unit; see `Field`
 
     Returns the Metric, for `metrics`.
@@ -187,7 +187,7 @@ def time_of(event: str, description: str = "", **options: Any) -> Metric:
 
 
 def inputs(**declared: Parameter | Setting) -> Any:
-    """The inputs of a model by their columns: a named tuple of the parameters, by which physics reads them from `p`.
+    """The class of `p`: a named tuple of the parameters, without their units; settings are declared here, too.
 
     declared : Parameter or Setting, by column
 
@@ -208,14 +208,14 @@ def inputs(**declared: Parameter | Setting) -> Any:
 
 
 def choices(inputs: Any) -> SimpleNamespace:
-    """The numbers that physics has for the words of settings: CHOICES = choices(Inputs), o.law == CHOICES.law.a.
+    """The numbers by which physics knows the words of settings: CHOICES = choices(Inputs), o.law == CHOICES.law.a.
 
     inputs : made by the function of this name
 
-    Returns the words of each setting with choices, by its name without unit.  One that is no name in Python is
-    getattr(CHOICES.law, "two-body"), kept under a name of its own outside of physics.
+    Returns an attribute for each setting with choices, by its name without unit; the words are its attributes.  For a
+    word that is not a Python name, assign getattr(CHOICES.law, "two-body") to a name outside the physics.
 
-    Raises AttributeError for what declares nothing.
+    Raises AttributeError for an argument that `inputs` has not made.
 
     >>> Inputs = inputs(law=Setting("a", "control law", choices=("a", "b")))
     >>> choices(Inputs).law.b
@@ -227,7 +227,7 @@ def choices(inputs: Any) -> SimpleNamespace:
 
 
 def states(**declared: str | Field) -> Any:
-    """The state of a model by its columns, each with its meaning: the named tuple that `initial` and `rhs` give.
+    """The class of the state: the named tuple that `initial` and `rhs` return.
 
     declared : str or Field, the meaning, by column
 
@@ -243,7 +243,7 @@ def states(**declared: str | Field) -> Any:
 
 
 def outputs(**declared: str | Field) -> Any:
-    """What is looked at along the flight, by its columns: the named tuple that `observe` gives.
+    """The class of the outputs along the flight: the named tuple that `observe` returns.
 
     declared : str or Field, the meaning, by column
 
@@ -258,11 +258,11 @@ def outputs(**declared: str | Field) -> Any:
 
 
 def metrics(**declared: str | Field | Metric) -> Any:
-    """The results of a case by their columns: the named tuple of those that `evaluate` gives, and those of the engine.
+    """The class of the metrics that `evaluate` returns; the metrics that the engine computes are declared here, too.
 
-    declared : str, Field, or what `maximum_of` and its like give, by column
+    declared : by column, a str or Field for `evaluate`, or the result of `maximum_of`, `at_end` and the like
 
-    Returns the named tuple of what `evaluate` gives.
+    Returns the named tuple of the metrics that `evaluate` returns.
 
     Raises ModelError for a name without its unit.
 
@@ -281,14 +281,14 @@ def metrics(**declared: str | Field | Metric) -> Any:
 
 
 def declared_in(*modules: ModuleType) -> dict[str, Any]:
-    """What the modules of a model declare, for `model`: MODEL = model(name=..., **declared_in(dynamics, outcome)).
+    """The arguments of `model` that modules define: MODEL = model(name=..., **declared_in(dynamics, outcome)).
 
-    modules : they may have State, Outputs, Metrics, EVENTS and EXTREMA, which become `states`, `outputs`, `metrics`,
-        `events` and `extrema`; and physics called initial, start, rhs, control, switch, observe or evaluate
+    modules : their names State, Outputs, Metrics, EVENTS and EXTREMA become the arguments `states`, `outputs`,
+        `metrics`, `events` and `extrema`; physics called initial, start, rhs, control, switch, observe or evaluate too
 
-    Returns the dictionary of what is found, by argument.
+    Returns the dictionary of all that are defined, by argument.
 
-    Raises ModelError where two modules have different things of one name.
+    Raises ModelError where two modules define the same name differently.
 
     >>> from campaigns.deorbit import dynamics
     >>> declared_in(dynamics)["rhs"] is dynamics.rhs
@@ -313,7 +313,7 @@ def _of_fields(title: str, what: str, declared: dict[str, Any]) -> Any:
 
 
 def _record(title: str, symbols: list[str], declared: tuple[Named, ...]) -> Any:
-    """The named tuple of these numbers, with `declared`: what is known of each."""
+    """The named tuple of these numbers; its attribute `declared` holds the declaration of each."""
     for symbol in symbols:
         if symbols.count(symbol) > 1:
             raise ModelError(f'{title}: two names are "{symbol}" without their units; give each a name of its own')
@@ -334,7 +334,7 @@ def _field(what: str, name: str, item: Any) -> Field:
 
 
 def _with_unit(item: Any, name: str) -> Any:
-    """The number with its name, and the unit that the name says."""
+    """The number with its name, and with the unit that its name ends in."""
     unit = item.unit
     if not isinstance(unit, str):
         raise ModelError(f'"{name}" has {unit!r} as its `unit`; it must be a text, such as "m/s"')

@@ -1,8 +1,8 @@
-"""`model`: makes the record that the engine reads from what a model file declares.
+"""`model`: makes the record that the engine reads from the declarations of a model file.
 
-A function of a model takes the arguments that it names, in any order; the engine calls them all alike, so each becomes
-a `ComposedFunction` that hands on the arguments that it names.  Events and metrics that have functions of their own, or
-none, are composed in the same way.
+A function of a model takes the arguments that it names, in any order, but the engine passes the same arguments to all.
+So each function becomes a `ComposedFunction`, which passes on the arguments that it names.  The functions of events,
+and the metrics that the engine computes, are composed in the same way.
 """
 
 import inspect
@@ -61,46 +61,46 @@ def model(
     data: tuple[str, ...] = (),
     published: tuple[Mapping[str, Any], ...] = (),
 ) -> Model:
-    """The model of a file, which ends with MODEL = model(...).
+    """The Model record of a model file, which ends with MODEL = model(...).
 
-    Except `prepare` and `tables`, which are NumPy, the functions are marked with `mc_engine.lanes.physics`.  Each takes
-    what it names, in any order, in SI and radians: the time t [s], the state s, the discrete state m, the parameters p
-    and the settings o, also called time, state, memory, parameters and settings.  What other files of the model declare
-    may be handed over by `declared_in`.
+    Functions are marked with `mc_engine.lanes.physics`, except `prepare` and `tables`, which are NumPy code.  Each one
+    takes the arguments that it names, in any order, in SI and radians: the time t [s], the state s, the discrete state
+    m, the parameters p and the settings o.  The names time, state, memory, parameters and settings are allowed, too.
+    Some functions take further arguments, see below.  `declared_in` collects the declarations of other files.
 
     name : str
     title : str, one line for reports
     inputs, states, outputs, metrics : made by the functions of these names
     clock : FixedStep or AdaptiveStep, the integrator
-    initial : p, o; gives the first state
-    rhs : gives the derivative of the state
-    phases : dict of Phase by name, in place of `rhs`, `control` and `events`: stretches of a flight, of which each has
-        its own.  A case begins in the first.  Functions of such a model may also take `since`, the time [s] since the
-        phase began, and `phase`, which has 1.0 for the phase that the case is in: `phase.rail`
-    observe : gives the outputs, which histories show
-    evaluate : best and when too, value and time of each extremum; gives the metrics that the engine does not compute
-    events : dict of Event by name.  Events with the same function share its call; it may give a named tuple, with a
+    initial : takes p and o alone; returns the first state
+    rhs : returns the derivative of the state
+    phases : dict of Phase by name, in place of `rhs`, `control` and `events`, which each phase then has of its own.  A
+        case begins in the first.  Functions of such a model may also take `since`, the time [s] since the phase began,
+        and `phase`, whose field is 1.0 for the phase that the case is in: `phase.rail`
+    observe : returns the outputs, the columns of time histories
+    evaluate : takes best and when, too: value and time of each extremum; returns the metrics not computed by the engine
+    events : dict of Event by name.  Events with the same function share its call; it may return a named tuple, with a
         number for each of them by name.
-    switch : hit too, which has 1.0 where an event acts; gives (state, discrete state) after events with the action
-        "switch", and where a phase begins: of the phase before it are m, since and phase
-    memory : class of the discrete state, a named tuple of numbers, or of records of them, with defaults, with which a
-        case starts; or see `start`
-    start : p, o; gives the first discrete state.  A model with phases, delayed events or metrics at events names its
-        class in `memory`, too
-    control : draws too; gives the next discrete state, at each sample, the first at t = 0
-    extrema : dict of extremes that `evaluate` finds in `best` and `when`, such as {"force": maximum_of("force_n")}.
-        Those of the metrics are there under the metrics' own names, without unit.
-    prepare(inputs, settings, refusals) : dict, by the fields of `kernel_parameters`, of SI arrays or of numbers for all
-        cases, such as {**vars(inputs), "burn_dv": dv}.  NumPy, for many cases at once: inputs and settings have an
-        attribute for each symbol, `inputs.altitude` for altitude_km.  Cases that cannot start are added to `refusals`.
+    switch : takes hit, too, whose field is 1.0 for an event that acts; returns (state, discrete state) after events
+        with the action "switch", and where a phase begins; there m, since and phase are those of the phase before
+    memory : class of the discrete state, a named tuple of numbers, or of records of them; without `start`, a case
+        starts with its default values
+    start : takes p and o alone; returns the first discrete state.  A model with phases, delayed events or metrics at
+        events must name its class in `memory`, too
+    control : takes draws, too; returns the next discrete state at each sample, the first at t = 0
+    extrema : dict of further extrema for `best` and `when`, such as {"force": maximum_of("force_n")}.  Extrema that are
+        metrics are there under the names of the metrics, without unit.
+    prepare(inputs, settings, refusals) : NumPy code for many cases; returns a dict with an SI array, or one number for
+        all cases, for each field of `kernel_parameters`, such as {**vars(inputs), "burn_dv": dv}.  inputs and settings
+        have attributes without unit, `inputs.altitude` for altitude_km.  Cases that cannot start go to `refusals`.
         An array "tables" [n, k] is put after the model's tables: a parameter must say where each case's begins.
     kernel_parameters : class of p, a named tuple; by default `inputs`; see `prepared`
-    tables(o) : float64[n], NumPy, numbers that all cases with the same settings share, such as a reference path;
-        physics reads them with look_up(o.tables, index), or look_up_record(o.tables, index, Row) for a named tuple
+    tables(o) : NumPy code; returns float64[n], numbers that cases with the same settings share, such as a reference
+        path; physics reads them with look_up(o.tables, index), or as a named tuple look_up_record(o.tables, index, Row)
     source : str, the publication that the physics is from
     figures : tuple of figure records, such as `MapFigure`, that every report shows
-    data : tuple of str, files that the model reads while it is imported, such as ("aero.csv", "tables/wind.csv"),
-        inside its own folder.  They count as its source, and a run directory keeps copies of them.
+    data : tuple of str, files in the model's folder that it reads while it is imported, such as ("aero.csv",
+        "tables/wind.csv").  They are part of its source, and a run directory keeps copies of them.
     published : tuple of dict, published values to compare with
 
     Returns the Model that the engine reads.
@@ -165,14 +165,14 @@ def model(
 
 
 def prepared(prepare: Callable[..., Any], inputs: Any) -> Any:
-    """The class of p of a model with `prepare`: model(..., kernel_parameters=prepared(prepare, Inputs)).
+    """The class of `p` for a model with `prepare`: model(..., kernel_parameters=prepared(prepare, Inputs)).
 
     prepare : see `model`; it is called once, for one case of the nominal inputs
     inputs : made by the function of this name
 
     Returns the named tuple, whose fields are the keys of what `prepare` returns.
 
-    Raises ModelError where it misuses what it is handed, or returns no dictionary.
+    Raises ModelError if `prepare` misuses its arguments, or does not return a dictionary.
 
     >>> Inputs = inputs(altitude_km=Parameter(300.0, "altitude of the orbit"))
     >>> prepared(lambda inputs, settings, refusals: {"radius": 6378e3 + inputs.altitude}, Inputs)._fields
@@ -197,7 +197,7 @@ def prepared(prepare: Callable[..., Any], inputs: Any) -> Any:
 
 
 def _phases(phases: Any, **others: Any) -> Mapping[str, Phase]:
-    """The phases, none of a model without; ModelError where something of theirs is declared beside them."""
+    """The phases, empty for a model without any; ModelError if it also declares something that belongs to a phase."""
     if phases is None:
         if others["rhs"] is None:
             raise ModelError("the model has no `rhs`; write rhs(s), which gives the derivative of the state, or phases")
@@ -295,7 +295,7 @@ def _starting(memory: Any) -> PhysicsFunction:
 
 
 def _meant(metrics: Any, outputs: Any) -> tuple[Field, ...]:
-    """The metrics; one that the engine computes and that has no description is described in the words of its output."""
+    """The metrics; one that the engine computes and that has no description gets one from its output's description."""
     words = {item.name: item.description for item in outputs.declared} | {_TIME.name: "time", "": "time"}
     fields = []
     for item in metrics.declared:

@@ -1,6 +1,6 @@
-"""Designs of a model that take seconds and serve all its cases, such as a burn program or a gain table.
+"""Design calculations that take seconds and serve all cases of a model, such as a burn program or a gain table.
 
-A design is computed once and kept in the cache folder, so that the next process, `resume` and `replay` find it.
+A design is computed once and kept in the cache folder, where the next process, `resume` and `replay` find it.
 """
 
 import dataclasses
@@ -32,21 +32,21 @@ _one_at_a_time = threading.RLock()  # a design may ask for another
 
 
 def kept_design(design: Callable[..., np.ndarray], *inputs: Any) -> np.ndarray:
-    """The array that `design(*inputs)` returns, from the cache if these inputs were designed before.
+    """The array that `design(*inputs)` returns, from the cache if it was computed before with the same inputs.
 
-    design : function of a module; its result follows from the inputs and the sources alone
+    design : function of a module; its result must depend on the inputs and the sources alone
     inputs : numbers, texts, None, arrays of numbers; tuples, lists, dictionaries, named tuples, dataclasses and
         `SimpleNamespace` of them
 
     Returns the array, of any shape and numeric type.
 
-    One design is computed at a time.  A design may ask for others, but not in threads that it waits for.
+    One design is computed at a time.  A design may call `kept_design`, but not in threads that it waits for.
 
-    A design is computed again after a change of the inputs, of a source in the folder of `design` or one that these
-    import, of the engine's physics, of NumPy or SciPy, or of the processor, and if its file is damaged.  A cache that
-    cannot be written costs the time of a computation, no result.
+    A design is computed again after a change of its inputs, of a source in the folder of `design` or imported from
+    there, of the engine's physics, of NumPy or SciPy, or of the processor, and if its file is damaged.  If the cache
+    cannot be written, the result is the same, but each process computes it anew.
 
-    Raises TypeError for inputs of other types: they cannot tell whether a design is the same.
+    Raises TypeError for inputs of other types, which cannot be compared with those of a kept design.
 
     >>> from mc_engine.physics.attitude import rotation_quaternion
     >>> kept_design(rotation_quaternion, np.zeros(3))
@@ -70,21 +70,21 @@ def kept_design(design: Callable[..., np.ndarray], *inputs: Any) -> np.ndarray:
 
 
 def compiled_loop(function: Callable[..., None]) -> Callable[..., None]:
-    """Decorator of a loop over numbers and arrays that would take too long in Python or NumPy: it runs as machine code.
+    """Decorator that compiles a loop over numbers and arrays, for loops that take too long in Python or NumPy.
 
-    function : takes float64 and int64 numbers and writable contiguous arrays of them, of one or two dimensions; writes
-        its results into arrays, which are all arguments, and returns nothing.  The functions that it calls are marked
-        with `mc_engine.lanes.physics` and may take arrays here
+    function : its arguments are float64 and int64 numbers, and writable contiguous arrays of them with one or two
+        dimensions.  It writes its results into arrays among its arguments, and returns nothing.  The functions that it
+        calls are marked with `mc_engine.lanes.physics`; here they may take arrays.
 
     Returns the compiled function, whose arguments are given by position.  Its attribute `__wrapped__` is `function`.
-    Both give the same bits where the mathematics is that of `mc_engine.lanes`.
+    Both give the same bits if all mathematical functions are from `mc_engine.lanes`.
 
-    The first call compiles, in a second or more, or loads the machine code from the cache folder.  It is kept there
-    under a digest of the function and of all that it calls and names; global numbers and arrays are constants.  Indices
-    are not checked.
+    The first call compiles, in a second or more, or loads the machine code from the cache folder, where it is kept
+    under a digest of the function and of all that it calls and names.  Global numbers and arrays are constants.
+    Indices are not checked.
 
-    Raises ModelError at a call if the function returns something, or calls one that is not physics; TypeError for other
-    arguments.
+    Raises ModelError at a call if the function returns something, or calls a function that is not physics; TypeError
+    for arguments of other types.
 
     >>> @compiled_loop
     ... def add_up(x, total):
@@ -121,10 +121,10 @@ def compiled_loop(function: Callable[..., None]) -> Callable[..., None]:
 
 @contextmanager
 def designing() -> Iterator[None]:
-    """Let designs be computed one at a time, with one thread for linear algebra.
+    """Within the block, no other design is computed, and linear algebra uses one thread.
 
-    OpenBLAS shares its sums among threads.  That changes the last digits, an optimizer enlarges them, and machines that
-    differ in their cores or their environment would fly different bits.
+    OpenBLAS divides its sums among threads, which changes the last digits, and an optimizer enlarges the difference.
+    Without this, machines with different numbers of cores would fly different bits.
     """
     from threadpoolctl import threadpool_limits
 

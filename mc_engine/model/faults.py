@@ -1,7 +1,7 @@
-"""Errors in a model's own code as one sentence each, with the file, the line and the usual fix.
+"""Error messages for a model's own code: one sentence each, with the file, the line and the usual fix.
 
-For errors in physics the sentence adds the source line and what physics may contain, since the messages of NumPy and of
-the compiler do not mention the user's code.
+For errors in physics the sentence adds the source line and what physics may contain, because the messages of NumPy and
+of the compiler do not mention the user's code.
 """
 
 import inspect

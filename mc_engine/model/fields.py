@@ -19,12 +19,13 @@ DIRECTIONS = {"rising": 1.0, "falling": -1.0, "either": 0.0}  # of events, and t
 
 
 class Named:
-    """A number with a name: what `Field`, `Parameter` and `Setting` have in common.
+    """A number with a name: the common part of `Field`, `Parameter` and `Setting`.
 
-    name : str, the column, which ends in its unit: "altitude_km".  The declaration gives it.
-    unit : str, one of `mc_engine.units.UNITS`; empty for a plain number.  By default the name's ending tells it.
+    name : str, the column, which ends in its unit: "altitude_km".  The declaration sets it.
+    unit : str, one of `mc_engine.units.UNITS`; empty for a plain number.  By default the ending of the name.
     description : str, one line
-    sometimes : bool, a metric that exists, or differs, only with some settings; `mc-engine check` does not miss it
+    sometimes : bool, a metric has a number, or differs between cases, only with some settings; `mc-engine check` then
+        does not report that it has none or is constant
 
     >>> altitude = Field("altitude of the orbit", name="altitude_km", unit="km")
     >>> altitude.symbol, altitude.si_factor
@@ -50,17 +51,16 @@ class Named:
 
 @dataclass(frozen=True)
 class Field(Named):
-    """A number that comes out of a model: a state, an output along the flight, or a metric that `evaluate` gives.
+    """A result of a model: a state, an output along the flight, or a metric that `evaluate` returns.
 
-    In a declaration a text is enough, unless more is to be said:
+    In a declaration, a text in place of a Field is its description:
     outputs(altitude_km="altitude", eccentricity=Field("eccentricity", unit="", low=0.0)).
 
-    description : str, one line.  Axes of figures say the name in words, `sun_angle_deg` as "sun angle [deg]"; where it
-        is a symbol, such as `ve_pct`, the description up to a comma or semicolon too.
-    low : float, smallest physical value, such as 0.0 of an eccentricity; reports draw no normal ellipse beyond it
+    description : str, one line.  Axes of figures show the name as words, `sun_angle_deg` as "sun angle [deg]"; if the
+        name is a symbol, such as `ve_pct`, they add the description up to its first comma or semicolon.
+    low : float, smallest physical value, such as 0.0 for an eccentricity; reports draw no normal ellipse beyond it
     high : float, largest physical value
-    sometimes : bool, a metric that exists, or differs, only with some settings; `mc-engine check` does not miss it
-    name, unit : see `Named`
+    sometimes, name, unit : see `Named`
 
     >>> apogee = Field("altitude of the apogee", low=0.0, name="apogee_altitude_km", unit="km")
     >>> apogee.symbol, apogee.si_factor
@@ -85,7 +85,7 @@ class Parameter(Named):
     description : str, one line
     low : float, smallest value that is accepted, in `unit`
     high : float, largest value that is accepted, in `unit`
-    random_draw : bool, the value only names a random draw, as a seed does; sensitivity counts it among the random draws
+    random_draw : bool, the value only selects a random draw, as a seed does; sensitivity counts it as a random draw
     sometimes : bool, see `Field`
     name, unit : see `Named`
 
@@ -106,16 +106,16 @@ class Parameter(Named):
 
 @dataclass(frozen=True)
 class Setting(Named):
-    """An input of a model that all cases of a batch share: a choice of words, a switch, a date, or a number.
+    """An input of a model that all cases of a batch share: one of several words, a switch, a date, or a number.
 
     default : str, bool or float, the nominal value
     description : str, one line
-    choices : tuple of str, the words; physics sees a number, see `choices`
-    low : float, smallest number that is accepted, in `unit`; of a date, as modified Julian date
+    choices : tuple of str, the words that are allowed; physics sees a number in place of a word, see `choices`
+    low : float, smallest number that is accepted, in `unit`; for a date, the modified Julian date
     high : float, largest number that is accepted
     whole : bool, only whole numbers are accepted, as for a count
     date : bool, the value is a date as text, "2019-01-01T12:00:00"; physics sees the modified Julian date in UTC
-    dispersed_by : str, the parameter by which a case deviates from the setting, if there is one
+    dispersed_by : str, name of the parameter, if there is one, by which a case deviates from the setting
     sometimes : bool, see `Field`
     name, unit : see `Named`; a choice, a switch and a date have no unit
 
@@ -158,10 +158,10 @@ class Extremum:
 
     name : str, the symbol in `best` and `when`
     quantity : str, the name of an output of the model
-    kind : str, "max", "min", or "last_above": the last time at which the output was above `level`, of which only the
-        time is of use
+    kind : str, "max", "min", or "last_above": the last time at which the output was above `level`; only the time in
+        `when` is meaningful then
     level : float, in SI; for "last_above"
-    smooth : bool, the extremum may lie between steps, on a curve through them; else it is taken at steps and events
+    smooth : bool, True: the extremum may lie between steps, on a curve through them; False: only at steps and events
 
     >>> Extremum("peak", "altitude_km").kind
     'max'
@@ -178,18 +178,19 @@ class Extremum:
 class Event:
     """A zero crossing of a function along the flight: events={"apogee": Event(climb_rate, "falling", "stop")}.
 
-    In a model with a stopping event, a case that reaches the integrator's `until` first has status no-stop, which
-    counts as failed.  Where a time is a regular end too, make it an event of its own, t - limit, before `until`.
+    In a model with a stopping event, a case that reaches the integrator's `until` first ends with status no-stop and
+    counts as failed.  If a case may also end regularly at a time limit, declare an event t - limit before `until`.
 
-    function : physics with the arguments that it names, of t, s, m, p, o; a number that crosses zero
+    function : physics that takes any of t, s, m, p, o by name; returns the number whose zero crossing is the event
     direction : str, "rising", "falling" or "either"
     action : str, "stop" ends the case, "switch" calls the model's `switch`; by default "stop", and "switch" with `to`
     to : str, the phase that begins, see `Phase`; `switch` may change state and discrete state there, too
-    after : float, time [s] from the crossing to the action, or str, the name without unit of a parameter that holds it,
-        of which a value below 0 counts as 0.  The action happens whatever follows the crossing; one that is waited for
-        does not begin again.
-    rare : bool, it may never happen in ordinary cases, or only with some settings; `mc-engine check` does not miss it
-    name : str, given by the model
+    after : float, delay [s] from the crossing to the action, or str, the name without unit of the parameter that holds
+        the delay; a value below 0 counts as 0.  The action is carried out whatever happens in between.  A further
+        crossing during the delay has no effect.
+    rare : bool, the event may not happen in ordinary cases, or only with some settings; `mc-engine check` then does
+        not report that it did not happen
+    name : str, set by the model
 
     >>> apogee = Event(lambda s: s.vz, name="apogee")
     >>> apogee.direction, apogee.action
@@ -213,16 +214,16 @@ class FixedStep:
     """An integrator on a time grid that all cases share: the classical Runge-Kutta method, or a multistep method.
 
     step : float, length of a step [s], or str, the symbol of a setting that holds it
-    until : float or str, end of the flight [s], at most 1e9 steps; inside a step, the flight ends with that step, which
-        `mc-engine check` reports.  In a model with a stopping event, see `Event`.
+    until : float or str, end of the flight [s], at most 1e9 steps.  If it lies inside a step, the flight ends with that
+        step, and `mc-engine check` reports it.  In a model with a stopping event, see `Event`.
     control_every : int or str, steps from one call of `control` to the next
     method : str, "rk4" (order 4), or for long smooth arcs "abm8" to "abm12", Adams-Bashforth-Moulton of order 8 to 12,
-        or "gj6" to "gj10", Gauss-Jackson with differences of order 6 to 10, where every state is the rate of another
-        or has one.  ABM is stable for steps below 0.37, 0.26, 0.18, 0.12, 0.075 over the fastest angular frequency
-        [rad/s], GJ for 0.33, 0.24, 0.17, 0.12, 0.09, and with weak damping only, see `mc_engine.lanes.gauss_jackson`.
-        Both start by DOP853, and again after each event and each sample of the control that changes the discrete
-        state. `mc-engine check` flies the nominal case with half of the step, too, and reports steps that are far too
-        long.
+        or "gj6" to "gj10", Gauss-Jackson with differences of order 6 to 10, for models in which each state either is
+        the rate of another state or has a rate among the states.  Largest stable step, divided by the fastest angular
+        frequency [rad/s]: ABM 0.37, 0.26, 0.18, 0.12, 0.075 for the five orders; GJ 0.33, 0.24, 0.17, 0.12, 0.09, and
+        only with weak damping, see `mc_engine.lanes.gauss_jackson`.  Both methods start by DOP853, and restart so after
+        each event and each control sample that changes the discrete state.  `mc-engine check` also flies the nominal
+        case with half the step, and reports a step that is far too long.
     rates : tuple of pairs (state, its rate) by their names without units, for GJ: the derivative of the first state of
         a pair is the second
 
@@ -239,18 +240,18 @@ class FixedStep:
 
 @dataclass(frozen=True)
 class AdaptiveStep:
-    """An embedded Runge-Kutta pair; every case chooses its own steps, to the tolerances.
+    """An embedded Runge-Kutta pair with step-size control; every case has its own steps.
 
     until : float, time limit [s], or str, the symbol of a setting that holds it; in a model with a stopping event, see
         `Event`
     rtol : float or str, error allowed in a step, as a fraction of the state's own size
-    atol : float, or tuple with one for each state, error allowed in a step, in SI, beside rtol's.  It alone counts
-        where a state passes through zero: far below what matters, as 1e-9 m in an orbit, it makes steps short there.
-    control_period : float, str or function of the settings, time [s] from one call of `control` to the next: at whole
-        multiples from t = 0, in phases with control alone, and steps end there.  A model with `control` needs it
+    atol : float, or tuple with one for each state, error allowed in a step, in SI, in addition to rtol's.  It alone
+        counts where a state passes through zero: a needlessly small value, as 1e-9 m in an orbit, makes steps short.
+    control_period : float, str or function of the settings, time [s] between calls of `control`, which happen at whole
+        multiples from t = 0, and only in phases with a control; steps end there.  Required by a model with `control`
     method : str, "dop853" (order 8) or "dp54" (order 5)
     attempts : int, a case that needs more steps, accepted and rejected ones together, ends as step-limit; at most 1e9
-    first_step : float, length [s] of the first attempt; 0 chooses it
+    first_step : float, length [s] of the first attempt; with 0 the engine chooses it
 
     >>> AdaptiveStep(until=86_400.0, rtol=1e-10).method
     'dop853'
@@ -266,7 +267,7 @@ class AdaptiveStep:
 
 
 def uses_rates(clock: FixedStep | AdaptiveStep) -> bool:
-    """Whether a clock's method is one for states of second order, which needs its `rates`."""
+    """Whether the method of a clock integrates second-order equations, for which it needs its `rates`."""
     return clock.method.startswith("gj")
 
 

@@ -1,8 +1,8 @@
-"""Figures that a model requests of every report, as data: what to draw, not how.
+"""Figures that a model requests for every report, as data: what to draw, not how.
 
-The run's manifest stores them, so that a report can be made later without the model.  Columns are those of the case
-table: inputs, metrics, `end_` states; a figure over an input that a run does not disperse is left out of its report.
-With `upstream` True, x and y may be columns of the run that the campaign takes its inputs from.
+The manifest of a run stores them, so that a report can be made later without the model.  Columns are those of the case
+table: inputs, metrics, `end_` states.  A figure over an input that a run does not disperse is left out of its report.
+With `upstream` True, x and y may also be columns of the run that the campaign takes its inputs from.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class MapFigure:
-    """Filled contours of a metric over two inputs, with the flown cases on them.
+    """Filled contours of a metric over two inputs, with the flown cases as points.
 
     metric : str, column
     x : str, column
@@ -79,10 +79,10 @@ class FootprintFigure:
     latitude : str, column, geodetic [deg]
     longitude : str, column [deg]
     title : str
-    ends_below : tuple (column, value) or None; a case above the value has not come down
+    ends_below : tuple (column, value) or None; a case whose column is above the value has not landed
     planet : str, the setting that names the planet; empty for the Earth
-    target : tuple of two columns or parameters, latitude and longitude aimed at; without it distances count from the
-        nominal case
+    target : tuple of two columns or parameters, latitude and longitude of the target; without it distances are
+        measured from the nominal impact point
 
     >>> FootprintFigure("end_latitude_deg", "end_longitude_deg", "Impact points").planet
     ''
@@ -98,7 +98,7 @@ class FootprintFigure:
 
 @dataclass(frozen=True)
 class ProfileFigure:
-    """One output of histories against another, as altitude against speed, with percentile bands of x at each y.
+    """One output of time histories over another, such as altitude over speed, with percentile bands of x at each y.
 
     x : str, output or "t_s"
     y : str, output or "t_s"
@@ -119,7 +119,7 @@ class CorridorFigure:
 
     x : str, column
     y : str, column
-    metrics : tuple of str, those whose requirements count
+    metrics : tuple of str, the metrics whose requirements are shown
     title : str
     upstream : bool, x and y may be columns of the run that a campaign takes its inputs from
 

@@ -1,7 +1,7 @@
-"""FMUs as simulators: what the table [simulator] of a campaign file says of one, checked against the FMU itself.
+"""FMUs as simulators: the table [simulator] of a campaign file, checked against the FMU that it names.
 
-FMI 2 and 3, co-simulation and model exchange, through the package fmpy.  Everything that can be wrong with the binding
-of names is found here, before anything flies; no code of the FMU runs for that.
+FMI 2 and 3, co-simulation and model exchange, through the package fmpy.  All errors in the names of variables are found
+here, before any flight and without running code of the FMU.
 """
 
 import io

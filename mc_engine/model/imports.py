@@ -1,7 +1,7 @@
 """Import of a model and of the modules in its folder or package, from file contents that are read exactly once.
 
 The code that runs is compiled from the same bytes that are digested and that the run directory keeps.  Bytecode files
-are not used: Python matches them to a source by its size and its time of change in seconds only.
+are not used, because Python matches them to a source only by its size and its modification time in seconds.
 """
 
 import linecache

@@ -1,8 +1,8 @@
-"""Phases of a flight, events whose action is delayed, and what is noted at events.
+"""Phases of a flight, events with a delayed action, and metrics at events.
 
-All of it is kept in the discrete state, behind the model's own fields: the number of the phase and the time it began,
-the time at which the action of a delayed event is due, time and outputs at an event.  A `Memory` names these fields;
-its methods make the functions that the engine's loops call, which know events and a discrete state and nothing else.
+Their data are fields of the discrete state, after the model's own: the number of the phase and the time it began, the
+time at which the action of a delayed event is due, and the time and outputs at an event.  A `Memory` names these
+fields.  Its methods make the functions for the engine's loops, which know only events and a discrete state.
 """
 
 from collections import namedtuple
@@ -25,14 +25,14 @@ _ALL = tuple(range(6))
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of a flight with a right-hand side of its own: phases={"rail": Phase(slide, events={...}), ...}.
+    """A phase of flight with its own right-hand side: phases={"rail": Phase(slide, events={...}), ...}.
 
-    A case begins in the first phase of the dictionary, and is in another from an event with `to` on.  What the phase of
-    no case in a vector needs is not computed.
+    A case begins in the first phase of the dictionary.  An event with `to` begins another phase.  The functions of a
+    phase are not computed while no case of the vector is in it.
 
-    rhs : the derivative of the state, as in `model`
-    control : gives the next discrete state at each sample in this phase; without one it stays as it is
-    events : dict of Event by name, looked for in this phase.  The same event may be in several phases.
+    rhs : returns the derivative of the state, as in `model`
+    control : returns the next discrete state at each sample in this phase; without it the discrete state stays the same
+    events : dict of Event by name, detected in this phase.  The same event may be in several phases.
 
     >>> Phase(rhs=None, events={"ground": Event(None, "falling")}).events["ground"].action
     'stop'
@@ -60,7 +60,7 @@ def _flag_of_either(before, number, wanted):
 
 @physics
 def _due(due, crossing, acted, t, after):
-    """Time at which the action is due; a crossing while it is being waited for changes nothing."""
+    """Time at which the delayed action is due; a further crossing during the delay changes nothing."""
     due = where(acted > 0.5, NEVER, due)
     ahead = where(t + after > t, t + after, t + 4e-16 * abs(t) + 1e-300)  # a step cannot end before it begins
     ahead = where(after == after, ahead, after)
@@ -79,7 +79,7 @@ def _moved(before, acted, after):
 
 @physics
 def at_first(noted, first, hit, value):
-    """What is noted of an event: `value` if it happens now and has not before, of which `first`, its time, tells."""
+    """The noted number of an event: `value` if it happens now for the first time; `first`, its time, tells that."""
     return where((hit > 0.5) & (first != first), value, noted)
 
 
@@ -89,9 +89,9 @@ def _as_it_is(t, s, m, p, o, draws):
 
 
 class Memory:
-    """The discrete state of a model: its own fields, and those that the engine keeps behind them.
+    """The discrete state of a model: its own fields, followed by those of the engine.
 
-    own : class of the model's own, None if it has none
+    own : class of the model's own discrete state, None if it has none
     phases : by name, empty for a model without
     events : all declared, by name
     noted : (event, symbol of an output or "" for the time), for each metric that is a value or time at an event
@@ -186,7 +186,7 @@ class Memory:
         return ComposedFunction([(watched, whole(range(5))), *since], both, picks)
 
     def _watched_in(self, events: Mapping[str, Event], calls: Mapping[str, Call]) -> ComposedFunction:
-        """All events; one that is not among `events` stays on the side that it would cross from.
+        """The functions of all events; one that is not among `events` is constant, on the side before its crossing.
 
         Events with the same function share its call, which may give a record of them.
         """
@@ -212,7 +212,7 @@ class Memory:
         return (*crossings, *actions)
 
     def switch(self, function: Any) -> ComposedFunction | None:
-        """What events do: the model's own `switch`, the next phase, delays that begin and end.  None where nothing."""
+        """The effects of events: the model's own `switch`, the next phase, delays that begin and end.  None without."""
         if function is None and not self.delayed and not any(event.to for event in self.events.values()):
             return None
         steps = _Steps()
@@ -262,7 +262,7 @@ class Memory:
         return ComposedFunction([], self.own, [("argument", 0, name) for name in self._own_fields])
 
     def note(self, observe: Any, symbols: Sequence[str]) -> ComposedFunction | None:
-        """What is noted when an event is first met: its time and outputs.  None where nothing is."""
+        """The function that notes time and outputs when an event first happens.  None if nothing is noted."""
         if not self.times:
             return None
         steps = _Steps()

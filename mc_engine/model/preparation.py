@@ -1,6 +1,6 @@
-"""Cases made ready for the kernel: inputs in SI, what the model's `prepare` makes of them, refusals.
+"""Preparation of cases for the kernel: inputs in SI, the kernel parameters from the model's `prepare`, refused cases.
 
-`prepare` is plain NumPy code, with other rules than physics, so its errors are explained here.
+`prepare` is plain NumPy code with other rules than physics, so its errors are explained here.
 """
 
 import inspect

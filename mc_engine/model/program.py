@@ -1,8 +1,8 @@
-"""The table [simulator] of a campaign file, and the simulator that is made of it where it names a program.
+"""The table [simulator] of a campaign file, and the simulator made from a table that names a program.
 
-`mc_engine.model.fmu` reads the table of an FMU.  The command is started without a shell, in the folder of its case.
-What a program is made of beside the campaign file counts as its source: the executable, files that the command names,
-templates, and `files`.
+`mc_engine.model.fmu` does this for an FMU.  The command is started without a shell, in the folder of its case.  The
+executable, the files next to the campaign file that the command names, the templates and `files` are the source of the
+simulator.
 """
 
 import os

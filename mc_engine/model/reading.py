@@ -1,7 +1,7 @@
-"""Checks the source of a model's physics against the list of what physics may contain; each breach is one sentence.
+"""Check of the source of a model's physics against the list of what physics may contain; each breach is one sentence.
 
-It reads the model's functions and all physics that they call, down to the engine's own.  `_SYNTAX`, `_VALUES` and
-`_BUILTINS` are the list; `mc_engine.model.trial` finds by running what the source alone does not show.
+It reads the functions of the model and all physics that they call, including the engine's own.  The list is `_SYNTAX`,
+`_VALUES` and `_BUILTINS`.  `mc_engine.model.trial` runs the physics to find what the source alone does not show.
 """
 
 import ast

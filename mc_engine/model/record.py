@@ -1,11 +1,11 @@
-"""The record of a model, which the engine reads: its numbers, its physics, its events and its integrator.
+"""The record of a model that the engine reads: its inputs and results, its physics, its events and its integrator.
 
-`mc_engine.model.model` makes it from the declarations of a model's file.  It names every number that goes in
-(parameters, settings) and comes out (states, outputs along the flight, metrics), with unit and one-line meaning, and
-points to the physics: plain functions on named tuples of numbers, marked with `mc_engine.lanes.physics`.
+`mc_engine.model.model` makes it from the declarations of a model file.  It names every input (parameters, settings) and
+result (states, outputs along the flight, metrics), with unit and one-line meaning, and refers to the physics: plain
+functions on named tuples of numbers, marked with `mc_engine.lanes.physics`.
 
-Inside physics everything is SI and radians and a parameter loses its unit suffix (`inclination_deg` is
-`inclination`, in radians); outside, every column has the unit its field declares.
+Inside physics everything is in SI and radians, and names have no unit suffix: `inclination_deg` is `inclination`, in
+radians.  Outside, every column has the unit that its field declares.
 """
 
 import ast
@@ -53,7 +53,7 @@ class Model:
     order: the time t [s], the state s, the discrete state m, the kernel parameters p and the settings o, each a named
     tuple of numbers in SI and radians.
 
-    name, title, source, clock, figures, data, published : as handed to `model`
+    name, title, source, clock, figures, data, published : as passed to `model`
     parameters : tuple of Parameter, inputs that may differ from case to case
     settings : tuple of Setting, inputs that all cases of a batch share
     states : tuple of Field, in the order of the state's named tuple
@@ -67,10 +67,10 @@ class Model:
     prepare(inputs, settings, refusals) : dict of kernel parameters, see `model`
     start(p, o) : the first discrete state
     control(t, s, m, p, o, draws) : the next discrete state, at each sample, the first at t = 0
-    samples(t, s, m, p, o) : 1.0 in a phase with samples, 0.0 in one without; by default there are samples throughout
+    samples(t, s, m, p, o) : 1.0 in a phase with a control, 0.0 in one without; None if all phases are the same in that
     events(t, s, m, p, o) : named tuple with one component for each Event
-    switch(t, s, m, p, o, hit) : (state, discrete state) after an event with the action "switch"; hit has 1.0 where it
-        fired
+    switch(t, s, m, p, o, hit) : (state, discrete state) after an event with the action "switch"; the field of hit is
+        1.0 for an event that happened
     note(t, s, m, p, o, hit) : the discrete state after an event, also one that ends the case; made by the engine
     event_list : tuple of Event, in the order of the components of `events`
     phases : tuple of str, the names of the phases, by the number that the discrete state holds
@@ -80,7 +80,7 @@ class Model:
     reference : str, set by `load_model`
     sources : Sources, set by `load_model`
 
-    Raises ModelError where the record contradicts itself.
+    Raises ModelError for a record that contradicts itself.
 
     >>> model = load_campaign("minimal").model
     >>> [metric.name for metric in model.metrics]
@@ -125,7 +125,7 @@ class Model:
         refuse_contradictions(self)
 
     def __hash__(self) -> int:
-        """Of what tells most models apart; that of all fields takes as long as the flight of a case."""
+        """A hash of the fields that tell most models apart; a hash of all fields takes as long as flying a case."""
         return hash((self.name, self.title, self.watching))
 
     def input(self, name: str) -> Parameter | Setting:
@@ -138,9 +138,9 @@ _CAN_START = np.array("", dtype=object)
 
 @dataclass
 class Refusals:
-    """The cases that a model cannot start from, each with one sentence: the third argument of `prepare`.
+    """The cases that a model cannot fly, each with the reason in one sentence: the third argument of `prepare`.
 
-    reason : object[n_cases] of str, not to be written to; empty for a case that can start
+    reason : object[n_cases] of str, read-only; empty for a case that can be flown
 
     >>> refusals = Refusals.none(3)
     >>> refusals.add(np.array([False, True, False]), "the perigee is below the surface")
@@ -152,7 +152,7 @@ class Refusals:
 
     @classmethod
     def none(cls, n_cases: int) -> "Refusals":
-        """No case refused, of n_cases."""
+        """The record for n_cases of which none is refused."""
         return cls(np.broadcast_to(_CAN_START, n_cases))
 
     def add(self, mask: np.ndarray, sentence: str) -> None:
@@ -171,7 +171,7 @@ class Refusals:
 
 
 def load_model(reference: str, beside: Path | None = None) -> Model:
-    """Load the model of a campaign: the `MODEL` of a module or of a file.  This runs the model's code.
+    """The `MODEL` of a module or of a file, such as a campaign names it.  Loading it runs the model's code.
 
     reference : str, a module ("campaigns.deorbit") or a file next to the campaign file ("model.py")
     beside : Path, the folder of the campaign file; the working folder by default

@@ -35,7 +35,7 @@ METHODS = {"FixedStep": ("rk4", *_MULTISTEP), "AdaptiveStep": ("dop853", "dp54")
 
 
 def refuse_contradictions(model: "Model") -> None:
-    """ModelError with one sentence if the model contradicts itself or names what there is not."""
+    """ModelError with one sentence if the model contradicts itself or names something that does not exist."""
     refuse_other_types(model, "the model")
     records: tuple[Any, ...] = (*model.event_list, *model.extrema)
     for record in records:
@@ -108,7 +108,7 @@ def _refuse_false_numbers(system: "System") -> None:
 
 
 def _refuse_half_letters(model: "System") -> None:
-    """ModelError for text that no file can hold: half of a pair of UTF-16."""
+    """ModelError for text that cannot be written to a file: a lone UTF-16 surrogate."""
     records = (*model.parameters, *model.settings, *model.states, *model.quantities, *model.metrics)
     texts = [model.name, model.title, model.source, model.figures, model.published, *map(vars, records)]
     try:
@@ -130,7 +130,7 @@ def _refuse_name(item: Named) -> None:
 
 
 def _refuse_swapped(item: Named) -> None:
-    """ModelError for limits that no number keeps."""
+    """ModelError for a lower limit above the upper one."""
     low, high = getattr(item, "low", -inf), getattr(item, "high", inf)
     if low > high:
         raise ModelError(f'"{item.name}" has low={low:g}, which is above high={high:g}; swap them')
@@ -172,7 +172,7 @@ def _refuse_unknown(what: str, word: Any, known: Iterable[str]) -> None:
 
 
 def _refuse_clock(clock: FixedStep | AdaptiveStep, settings: list[str], states: list[str]) -> None:
-    """ModelError for numbers by which nothing can fly.  settings, states : symbols that a clock may name."""
+    """ModelError for invalid numbers of the integrator.  settings, states : symbols that it may name."""
     kind = type(clock).__name__
     if clock.method not in METHODS[kind]:
         raise ModelError(f'the clock has the method "{clock.method}"; {kind} has {listed(METHODS[kind])}')

@@ -1,7 +1,7 @@
-"""Simulators: systems that fly by a Python function or a program of their own, instead of a compiled model.
+"""Simulators: systems that are flown by a Python function, a program or an FMU, instead of a compiled model.
 
-A simulator declares its numbers as models do, and offers the same attributes to all that asks what goes in and what
-comes out.  `mc_engine.flight.simulated` flies it, each worker in a process of its own.
+A simulator declares its inputs and results as models do, and has the same attributes for them.
+`mc_engine.flight.simulated` flies it, each worker in a process of its own.
 """
 
 import math
@@ -40,7 +40,7 @@ LONGEST_S, LARGEST_MIB = 1e8, 2**30
 
 
 class Refuse(Exception):
-    """Raised by the function of a simulator: these inputs cannot be flown.  The case ends as `refused`, with the text.
+    """Raised by the function of a simulator for inputs that cannot be flown; the case ends as `refused`, with the text.
 
     >>> try:
     ...     raise Refuse("the mass is above the payload of the launcher")
@@ -52,32 +52,32 @@ class Refuse(Exception):
 
 @dataclass(frozen=True)
 class Simulator:
-    """A system that flies by its own code: a Python function, or a program or FMU that a campaign file describes.
+    """A system flown by its own code: a Python function, or a program or FMU that a campaign file describes.
 
     A file or module ends with `SIMULATOR = Simulator(...)`, and the campaign file names it as `simulator`.
 
     title : str, one line for reports
-    parameters : made by `inputs`: each Parameter may differ from case to case; each Setting is shared by all, and is
-        found in `settings`
-    metrics : made by `metrics`, the results of a case, all of which `fly` gives
+    parameters : made by `inputs`: each Parameter may differ from case to case; each Setting is shared by all cases and
+        moves to the attribute `settings`
+    metrics : made by `metrics`, the results of a case; `fly` must return all of them
     fly(inputs, case) : a mapping of the metrics, or (metrics, history).  `inputs` has the value of every parameter and
         setting by name, in declared units.  `case` has `id`; `seed`, a whole number of 64 bits; `rng`, a NumPy
         generator of this case; `folder`, its own and empty; `shared`, what `start` returned.  history is a DataFrame
         with t_s and the outputs.  `raise Refuse("why")` refuses the inputs.  With `batch`, inputs and metrics are
         arrays [n], `id` and `seed` too, `rng` a list of generators, and NaN in a metric fails its case alone.
         Without `fly`, the record declares what `mc-engine import` reads.
-    outputs : made by `outputs`, what histories hold besides the time t_s
+    outputs : made by `outputs`, the columns of time histories besides the time t_s
     settings : tuple of Setting, those among `parameters`
-    start() : called once in each worker, before its first case; loads a library or opens a licence
-    batch : bool, many cases at a time
+    start() : called once in each worker, before its first case; to load a library or to check out a licence
+    batch : bool, `fly` takes arrays of many cases
     name : str, by default that of the file
     source : str, the publication or the version that the results are from
-    time_limit_s : float, a case that takes longer ends as time-limit; by default it may take any time
-    memory_limit_mib : float, memory that the process of a worker may have; a case beyond it ends as memory-limit
-    slots : int, cases that fly at a time, as licences allow; by default as many as there are workers
-    keep : str, whose folders are kept in the run directory: "none", "failed", "all"
-    deterministic : bool, `replay` compares bits; otherwise numbers may differ by `tolerance`, a fraction of them
-    tolerance : float, the fraction
+    time_limit_s : float, a case that takes longer ends as time-limit; no limit by default
+    memory_limit_mib : float, memory that the process of a worker may use; a case beyond it ends as memory-limit
+    slots : int, most cases that fly at the same time, such as the number of licences; by default one per worker
+    keep : str, the cases whose folders are kept in the run directory: "none", "failed", "all"
+    deterministic : bool, True: `replay` compares bits; False: numbers may differ by the fraction `tolerance`
+    tolerance : float, largest relative difference
     figures : tuple of figure records, as of a `model`
     data : tuple of str, files that the simulator reads from its own folder, as of a `model`
     published : tuple of dict, published values to compare with
@@ -147,7 +147,7 @@ class Simulator:
 
     @property
     def quantities(self) -> tuple[Field, ...]:
-        """The outputs, by the name that models have for them."""
+        """The outputs, under the name that they have in a Model."""
         return self.outputs
 
     @property
@@ -157,12 +157,12 @@ class Simulator:
 
     @property
     def may_draw(self) -> bool:
-        """Whether it is handed a seed or a generator; an FMU is not."""
+        """Whether it receives a seed or a generator; an FMU does not."""
         return self.fmu is None
 
     @property
     def states(self) -> tuple[Field, ...]:
-        """None: what a simulator integrates is its own affair."""
+        """Empty: the engine does not know the state of a simulator."""
         return ()
 
     def digest(self) -> str:

@@ -1,7 +1,7 @@
-"""The source files that decide a model's numbers: those of its package or folder, and what they import.
+"""The source files of a model, on which its results depend: those of its package or folder, and what they import.
 
-The list may hold files that the model does not need.  Each file is read once: the same content runs, is digested, and
-is kept in the run directory.
+The list may hold files that the model does not need.  Each file is read once: the same content is run, digested, and
+kept in the run directory.
 """
 
 import sys

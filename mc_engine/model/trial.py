@@ -1,7 +1,7 @@
 """Interpreted run of a model's physics on a few cases: its results must have the fields that the model declares.
 
-The inputs are arrays, as lanes hand them over, so that code for a single number is found here.  A kernel relies on
-the declared counts, so a model that has not passed is not flown.
+The inputs are arrays, as in lanes, so that code that works only for a single number is found here.  A kernel relies on
+the declared numbers of fields, so a model that has not passed this run is not flown.
 """
 
 import dis
