@@ -1,14 +1,14 @@
 """Adaptive flight in lanes: each lane steps, locates events and ends independently, then takes the next case.
 
-A round of the loop is one attempt of every lane, so no lane waits for the events of another.  Before the next attempt
-a round without one prepares the lanes that take a case or that the model has changed.
+In each round of the loop every lane attempts one step, so no lane waits for the events of another.  Lanes that take a
+new case, or whose state the model has changed, are prepared in a round without attempts before the next one.
 
 state       attempt                        next state
 stepping    a full step                    stepping; closing if it passed an event; shortening if it may have met zero
 closing     a part of the step's length    closing; stepping once the event is located to tolerance
 shortening  a step to the likely zero      stepping; closing if it passed an event
 
-An event is a zero of a sense (see `adaptive_step`); peaks are zeros of rates, so they are as exact as events.
+An event is a zero of a sense (see `adaptive_step`).  A peak is a zero of a rate, so it is located as exactly as events.
 """
 
 from collections import namedtuple

@@ -1,7 +1,7 @@
-"""One attempt of an adaptive Runge-Kutta step in lanes, its error, and what its end looks like.
+"""One attempt of an adaptive Runge-Kutta step in lanes, its error, and the event values at its end.
 
-Every lane has a time, a length and an error of its own.  The stages stand in memory, so a step is a short loop over
-the tables of the method (`runge_kutta_pairs`).
+Every lane has its own time, step length and error.  The stages are kept in memory, so a step is a short loop over the
+tables of the method (`runge_kutta_pairs`).
 """
 
 from collections import namedtuple
@@ -88,8 +88,8 @@ def ideal_factor(error, power):
 def next_length(length, error, ideal, last_ideal):
     """Length [s] of the attempt after one of this length and error.
 
-    ideal, last_ideal : lengths whose error would have been 1, now and a step before.  Where they fall, the next is
-    expected to be less by the same ratio, which saves most of the rejected steps towards air or a perigee.
+    ideal, last_ideal : lengths whose error would have been 1, in this step and the one before.  If they decrease, the
+    next one is expected to decrease by the same ratio, which avoids most rejected steps towards air or a perigee.
 
     K. Gustafsson, ACM Transactions on Mathematical Software 20 (1994) 496-517.
     """
@@ -168,8 +168,8 @@ def is_lost(kind, value):
 def arm(kind, sense0, value0, sense1, value1, best, h):
     """1 where a crossing counts; a peak counts if its top may beat the best so far.
 
-    Where the tangents meet within the step they bound the top; elsewhere the hill is not bent one way, and nothing
-    does, but a hill that is flat beside its value is one of rounding.
+    If the tangents meet within the step, they bound the top.  Otherwise the curve has an inflection, and nothing bounds
+    the top; but a peak that is tiny compared with its value comes from rounding.
     """
     hill = (sense0 > 0.0) & (sense1 < 0.0)
     x = (value1 - value0 - sense1 * h) / where(hill, sense0 - sense1, 1.0)
@@ -183,7 +183,7 @@ def turn_length(kind, sense0, rate0, sense1, rate1, h):
     """Length to the turn of a sense that may have crossed zero and come back; h where it has not.
 
     One of the two crossings has the direction of the event, whichever that is.  The tangents at both ends bound a sense
-    that is bent one way; where they meet beyond zero it is worth a look.
+    without inflection; a crossing is possible only if they meet beyond zero.
     """
     down = (sense0 > 0.0) & (sense1 > 0.0) & (rate0 < 0.0) & (rate1 > 0.0)
     up = (sense0 < 0.0) & (sense1 < 0.0) & (rate0 > 0.0) & (rate1 < 0.0)
@@ -220,7 +220,7 @@ sense = compile_inline(_sense)
 
 
 def _glance(f, tables, h, here, p, o):
-    """State a length h [s] after `here`, by a step of its own that leaves the flight as it is."""
+    """State a length h [s] after `here`, by a separate step that does not change the flight."""
     memory = stage_memory(here.s, LARGEST_STAGES)
     put_stage(memory, 0, here.k)
     return attempt(f, tables, memory, here.t, h, here.s, here.m, p, o)

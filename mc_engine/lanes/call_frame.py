@@ -1,9 +1,9 @@
-"""How compiled functions call one another: as numba's do, and with the data that the kernel was handed at hand.
+"""How compiled functions call one another: by numba's convention, and with access to the data of the kernel.
 
 Every function that numba compiles takes, before its own arguments, the address of a slot for errors.  numba makes a
-slot for each call; here the callers hand their own on, so that all functions of one call of a kernel have the same, on
-the stack of its thread.  Behind it lies the address of the kernel's data.  So physics reads data without an argument
-for them, and nothing of it is global: any number of threads may fly other data through the same machine code.
+slot for each call.  Here the callers pass on their own slot, so that all functions in one call of a kernel have the
+same one, on the stack of its thread.  The address of the kernel's data follows it in memory.  So physics reads data
+without an argument for them, and without globals: many threads may fly different data through the same machine code.
 """
 
 from typing import Any

@@ -1,15 +1,15 @@
-"""Physics put together from the functions of a model: each is handed the arguments that it names.
+"""Physics composed of several functions of a model, each called with the arguments that it names.
 
-The engine's loops call every function with the same arguments in the same order.  A `ComposedFunction` hands each of
-its parts those that it asks for, and gathers their results in one record.  Kernels compile it to these calls alone
-(`mc_engine.lanes.model_intrinsics`): no copy, no other operation, the same bits.
+The engine's loops call every function with the same arguments in the same order.  A `ComposedFunction` passes to each
+of its parts the arguments that it names, and collects their results in one record.  Kernels compile it to these calls
+alone (`mc_engine.lanes.model_intrinsics`), without copies or other operations, so the bits are the same.
 
-`Alternatives` are functions of which each case has its own, such as the right-hand sides of phases.  A function of
-which no lane of a vector has need is not run; a lane's result is chosen, never mixed, so that it has the same bits
-beside any other.
+`Alternatives` are functions of which each case uses one, such as the right-hand sides of phases.  A function that no
+lane of a vector needs is not run.  The result of a lane is selected, never blended, so its bits do not depend on the
+other lanes.
 
-What physics consists of, and which data it reads, is found by the names in its functions, without running or compiling
-them: `blocks_in`, `has_powers`.
+`blocks_in` and `has_powers` find the data that physics reads, and its powers, by the names in its functions, without
+running or compiling them.
 """
 
 import dis
@@ -29,12 +29,12 @@ Call = tuple[Callable[..., Any], tuple[Pick, ...]]  # a function, and what it is
 
 
 class ComposedFunction(PhysicsFunction):
-    """Physics that calls others, one after another.
+    """Physics that calls other functions, one after another.
 
-    calls : the functions, each with what it is handed
-    record : class of the result's named tuple, or tuple; None where the result is that of the last call
+    calls : the functions, each with its arguments
+    record : class of the result's named tuple, or tuple; None if the result is that of the last call
     picks : one for each field of the record
-    written : the function of the model that a message about this one names; None where there are several
+    written : the function of the model that error messages name; None if there are several
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class ComposedFunction(PhysicsFunction):
 
 
 class Alternatives(PhysicsFunction):
-    """Physics that is function k where a number among the arguments is k.
+    """Physics that calls function k in lanes where one of its arguments is k.
 
     number : the field of an argument.  parts : functions of the same arguments, which give the same record.
     """

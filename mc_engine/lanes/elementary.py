@@ -1,9 +1,9 @@
 """Elementary functions on numbers and lanes: branch-free, the same bits at every width.
 
 Errors, measured against 40-digit arithmetic in the tests: at most 1.5 ulp for exp, sin, cos, log, atan2 and
-pow, at most 2.5 ulp for tan, asin and acos.  Angles up to 1e9 rad keep that accuracy; beyond, the reduction
-slowly loses digits, and from 1e16 rad on the answer means nothing.  Not-a-number in, not-a-number out; zeros and
-infinities as in C99, but sin and tan of -0.0 are 0.0.
+pow, at most 2.5 ulp for tan, asin and acos.  Angles up to 1e9 rad keep that accuracy; for larger ones the reduction
+gradually loses digits, and from 1e16 rad on the result is meaningless.  A NaN argument gives NaN.  Zeros and
+infinities are as in C99, except that sin and tan of -0.0 are 0.0.
 """
 
 from mc_engine.lanes.functions import (

@@ -1,6 +1,6 @@
 """Running extrema of outputs along a flight, interpolated between the grid points.
 
-An output that is NaN once has no extreme value; it has a last time above a level if it is above it later.
+Once an output is NaN, its extreme value is NaN.  Its last time above a level is a number if it is above it later.
 """
 
 from mc_engine.lanes.functions import maximum, minimum, where
@@ -13,21 +13,21 @@ ALIKE = 4.0  # times as strongly; a Gauss curve with a deviation of two steps be
 
 @physics
 def first_time(value, t):
-    """The time t of an extremum whose first value this is."""
+    """The time of an extremum at its first value: t."""
     return t
 
 
 @physics
 def crest(v0, v1, v2, best):
-    """Mask: the middle one of three neighbouring values tops both and may top the best so far, or is not a number."""
+    """Mask: the middle of three neighbouring values is the largest and may exceed the best so far, or it is NaN."""
     return not ((v1 < v0) | (v1 < v2) | (v1 + abs(v1 - v0) + abs(v1 - v2) <= best))
 
 
 @physics
 def smooth_where_bent_alike(smooth, v0, v1, v2, v3, v4, t0, t1, t2, t3, t4):
-    """`smooth` where five looks tell of no jump or corner: the curve bends at the middle one as beside it; else 0.
+    """`smooth` where five values show no jump or corner, else 0: at most ALIKE times the curvature next to the middle.
 
-    What no time lies before, or hardly any after, tells nothing.
+    A side is not tested if its two outer values are at the same time, or nearly so at the end.
     """
     a, b, c, d = t1 - t0, t2 - t1, t3 - t2, t4 - t3
     before = ((v2 - v1) / b - (v1 - v0) / a) / (a + b)
@@ -39,7 +39,7 @@ def smooth_where_bent_alike(smooth, v0, v1, v2, v3, v4, t0, t1, t2, t3, t4):
 
 @physics
 def _vertex(t0, t1, t2, v0, v1, v2):
-    """Time from t1 to the vertex of the parabola through three points; 0 where they are in line."""
+    """Time from t1 to the vertex of the parabola through three points; 0 if they are on a straight line."""
     a, b = t1 - t0, t2 - t1
     left, right = (v1 - v0) * b, (v2 - v1) * a
     bend = left - right
@@ -49,7 +49,7 @@ def _vertex(t0, t1, t2, v0, v1, v2):
 
 @physics
 def crest_time(when, best, v0, v1, v2, t0, t1, t2, smooth, mask):
-    """Time of the best value, the crest of the last three values included where the mask holds."""
+    """Time of the best value so far, including the crest of the last three values where the mask holds."""
     value = crest_value(best, best, v0, v1, v2, t0, t1, t2, smooth, mask)
     when = where(value > best, t1 + smooth * _vertex(t0, t1, t2, v0, v1, v2), when)
     return where(value == value, when, value)
@@ -57,7 +57,7 @@ def crest_time(when, best, v0, v1, v2, t0, t1, t2, smooth, mask):
 
 @physics
 def crest_value(best, unused, v0, v1, v2, t0, t1, t2, smooth, mask):
-    """Best value so far, the crest of the last three values included where the mask holds.
+    """Best value so far, including the crest of the last three values where the mask holds.
 
     smooth : 1.0 takes the crest of the parabola, 0.0 the middle value itself.
     """
@@ -92,7 +92,7 @@ def nearer_crest(x, slope, bend, low, high):
 
 @physics
 def is_top(v0, v1, v2):
-    """Mask: the middle one of three neighbouring values tops both, or is not a number."""
+    """Mask: the middle of three neighbouring values is the largest, or is NaN."""
     return not ((v1 < v0) | (v1 < v2))
 
 
@@ -134,19 +134,19 @@ def later_fall(when, x, t, h, mask):
 
 @physics
 def end_value(best, value, mask):
-    """Best value, that of an event or of the end of the flight included where the mask holds."""
+    """Best value so far, including the value at an event or at the end of the flight where the mask holds."""
     return where(mask & ((value > best) | (value != value)), value, best)
 
 
 @physics
 def end_time(when, best, value, t, mask, unused):
-    """Time of the best value, that of an event or of the end of the flight included where the mask holds."""
+    """Time of the best value so far, including an event or the end of the flight where the mask holds."""
     return where(mask & (value > best), t, where(mask & (value != value), value, when))
 
 
 @physics
 def above(when, v1, t1, mask):
-    """Last time at which the value stood above zero, as far as the steps tell."""
+    """Last time at which the value was above zero at a step."""
     return where(mask & (v1 > 0.0), t1, where(mask & (v1 != v1), v1, when))
 
 

@@ -1,11 +1,11 @@
 """The block loop on a fixed time grid: W cases side by side, sampled control, events, running extrema.
 
-All lanes of a block share the grid; a lane that meets an event takes its own way to the end of the step and
-rejoins.  Lanes never look at each other: a lane that has ended or failed keeps its last values.  Of its memory, most of
-what a model holds, they are set aside: to choose between old and new at every sample costs copies of all of it.
+All lanes of a block share the grid.  A lane in which an event happens flies to the end of the step on its own, and
+rejoins the others there.  Lanes are independent: one that has ended or failed keeps its last values.  Its discrete
+state is saved apart, because a choice between old and new at every sample would copy all of it.
 
-The loop is handed its `Method`: the classical Runge-Kutta method of fourth order, which is here, or one that uses
-earlier steps (`multistep`, `gauss_jackson`).  W. Kutta, Zeitschrift für Mathematik und Physik 46 (1901) 435-453.
+The loop takes a `Method`: the classical Runge-Kutta method of fourth order, which is here, or one that uses earlier
+steps (`multistep`, `gauss_jackson`).  W. Kutta, Zeitschrift für Mathematik und Physik 46 (1901) 435-453.
 """
 
 from collections import namedtuple
@@ -108,10 +108,10 @@ last_five = compile_inline(_last_five)
 
 
 def _track_by_three(number, t, h, closing, lanes, smooth, seen, best, when):
-    """Running extrema (best, when) after one more look, by the parabola through three looks where they tell of no jump.
+    """Running extrema (best, when) after one more value, by the parabola through three values that show no jump.
 
-    seen : five looks, of which the third may be a crest.  They are the last of the flight, and the newest of them has
-    this number, at t; if `closing` the newest stands there twice, so that the one before it may be the crest.
+    seen : the last five values, of which the third may be a crest.  The newest one has this number and is at t.  If
+    `closing`, the newest one is there twice, so that the one before it may be the crest.
     """
     v0, v1, v2, v3, v4 = seen
     crests = lanes & any_field(map_fields(extrema.crest, v1, v2, v3, best))
@@ -168,7 +168,7 @@ looks_from = compile_inline(_looks_from)
 def _step(f, method, past, has_events, t, finish, h, s, m, p, o, flying, reached, history, rows):
     """One grid step from t to `finish`: (state, memory, time, stopped, overrun, broken, past, reached) of every lane.
 
-    The event values at the start are taken anew, not handed on: they share what the first derivative computes.
+    The event values at the start are computed again, not passed on: they share computations with the first derivative.
     """
     end, past = method.advance(f, method.tables, past, t, finish, h, s, m, p, o, flying)
     now, stopped = finish, flying & (not flying)
@@ -192,8 +192,8 @@ step = compile_inline(_step)
 def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events, history, rows, stride):
     """Fly one block from its first state to the stop or the time limit.
 
-    The outputs are looked at where a step begins, beside its first derivative, with which they share most of
-    their work, at both sides of an event, and where a flight ends.
+    The outputs are computed at the start of a step, with its first derivative, with which they share most of their
+    work; also on both sides of an event, and at the end of a flight.
     A history has the start, every `stride` steps and their samples, all events, and the end.
     Returns (time, state, memory, status, unstopped, best, when, last) of every lane.
     """

@@ -1,7 +1,7 @@
 """Arithmetic on a number or on a vector of cases: the functions that physics imports instead of `math`.
 
-Each function here is its own interpreted meaning, on floats and NumPy arrays.  Compiled physics uses the
-vector instruction of the same name (see `lowering`), with the same result to the last bit.
+The functions here are the interpreted versions, for floats and NumPy arrays.  Compiled physics uses the vector
+instructions of the same names (see `lowering`), with results identical to the last bit.
 """
 
 import ctypes
@@ -46,31 +46,31 @@ def floor(x):
 
 
 def minimum(x, y):
-    """The smaller of x and y; y where they are equal, as 0.0 and -0.0 are.  Not a number where either is not one."""
+    """The smaller of x and y; y where they are equal, as 0.0 and -0.0 are.  NaN if either is NaN."""
     return where((x < y) | (x != x), x, y)
 
 
 def maximum(x, y):
-    """The larger of x and y; y where they are equal, as 0.0 and -0.0 are.  Not a number where either is not one."""
+    """The larger of x and y; y where they are equal, as 0.0 and -0.0 are.  NaN if either is NaN."""
     return where((x > y) | (x != x), x, y)
 
 
 def copysign(x, y):
-    """|x| with the sign of y.  Not a number where either is not one: its sign means nothing."""
+    """|x| with the sign of y.  NaN if either is NaN, as the sign of a NaN means nothing."""
     return where(y == y, sign_copied(x, y), y)
 
 
 @taking_numbers
 def sign_copied(x, y):
-    """|x| with the sign bit of y, whatever y is."""
+    """|x| with the sign bit of y, also if y is NaN."""
     return _plain(np.copysign(x, y))
 
 
 def where(mask, x, y):
-    """x where mask holds, y elsewhere.  Both are computed, so their arguments must be in range.
+    """x where mask is true, y elsewhere.  Both are computed, so the arguments of both must be in range.
 
-    mask : truth values, as a comparison gives them.  x, y : numbers, or named tuples of one class, whose fields are
-    chosen.  ModelError for others, which kernels refuse, too.
+    mask : truth values, the result of a comparison.  x, y : numbers, or named tuples of one class, for which each field
+    is selected.  ModelError for others, which kernels refuse, too.
     """
     if type(mask) is bool and type(x) is float and type(y) is float:
         return x if mask else y  # nearly all that an interpreted flight asks for
@@ -99,10 +99,10 @@ def replace(record, /, **fields):
 
 
 def merged(made, /, *records, **fields):
-    """The record of the class `made` with the fields given by name, and the others from the records that have them.
+    """A record of the class `made`: the fields given by name, and all others from the records that have them.
 
     made : class of a named tuple, such as in merged(Outputs, ground, place, speed=v).  ModelError for a field that the
-    class does not have, that is in none of the records, or in two of them.
+    class does not have, or that is in none of the records, or in two of them.
     """
     for name in fields:
         if name not in made._fields:
@@ -149,9 +149,10 @@ TABLES = "tables"  # name of the settings' field that holds a model's tables
 
 @taking_numbers
 def look_up(tables, place):
-    """The number at `place` of the model's tables: a whole number, as a float or as an integer of a loop.
+    """The number at the index `place` of the model's tables.
 
-    Below the first place, the first; above the last, the last.  Not a number where the place is not one.
+    place : a whole number from 0 on, as a float or as an integer of a loop.  Below the first index, the first number;
+    above the last index, the last one.  NaN for a NaN.
     """
     if isinstance(place, float | int):
         return float(tables[int(min(max(place, 0.0), len(tables) - 1.0))]) if place == place else math.nan
@@ -161,15 +162,15 @@ def look_up(tables, place):
 
 
 def look_up_record(tables, place, record):
-    """The record whose numbers are in the model's tables one after another, the first at `place`; see `look_up`.
+    """The record whose numbers are in the model's tables one after another, the first at index `place`; see `look_up`.
 
-    record : class of a named tuple of numbers, from which the tables are made, too: [*Row(start=0.0, length=1.0)]
+    record : class of a named tuple of numbers; also make the tables from it: [*Row(start=0.0, length=1.0)]
     """
     return record(*(look_up(tables, place + index) for index in range(len(record._fields))))
 
 
 def any_lane(mask):
-    """True if mask holds in at least one lane.  mask : as in `where`."""
+    """True if mask is true in at least one lane.  mask : as in `where`."""
     _refuse_number(mask, "any_lane")
     return bool(np.any(mask))
 

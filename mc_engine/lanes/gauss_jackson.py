@@ -1,20 +1,20 @@
-"""Gauss-Jackson steps in lanes, for states of second order: positions whose derivatives are states too, their rates.
+"""Gauss-Jackson steps in lanes, for second-order equations: positions, and their rates, which are states too.
 
-The method sums the accelerations twice.  Rates and positions at the end of a step come from both sums and the
-accelerations at the last grid points, without the state before: rounding errors of a position do not accumulate.
-"gj8" takes differences of the accelerations up to the eighth, so accelerations at 9 grid points.
+The method sums the accelerations twice.  Rates and positions at the end of a step are computed from both sums and the
+accelerations at the last grid points, not from the state before, so rounding errors of a position do not accumulate.
+"gj8" uses differences of the accelerations up to the eighth, so accelerations at 9 grid points.
 
-Each step predicts and evaluates once (PE).  A corrector would cost a second evaluation.  It pays for Adams' formulas,
-whose prediction alone is stable for short steps only, see `multistep`.  In second sums the prediction alone is stable:
-an oscillation of w rad/s does not grow while step times w is below 0.33, 0.24, 0.17, 0.12, 0.09 for gj6 to gj10.  The
-acceleration may depend on the rates, which are predicted to the same order, but weakly, as with drag in orbit: step
-times damping rate must be below 0.023, 0.012, 0.006, 0.003, 0.0016.  The error falls with the power of the step that is
-two more than the order of the differences; that of gj10 is at rounding before its power shows (all measured in
+Each step predicts and evaluates once (PE).  A corrector would cost a second evaluation.  Adams formulas need one, since
+their prediction alone is stable for short steps only, see `multistep`.  With second sums the prediction alone is
+stable: an oscillation of w rad/s does not grow while step times w is below 0.33, 0.24, 0.17, 0.12, 0.09 for gj6 to
+gj10.  The acceleration may depend on the rates, which are predicted to the same order, but only weakly, as with drag in
+orbit: step times damping rate must be below 0.023, 0.012, 0.006, 0.003, 0.0016.  The order of the method is the order
+of the differences plus two; gj10 reaches rounding errors before its order can be seen (all measured in
 tests/mc_engine/lanes/test_gauss_jackson.py).
 
-A flight begins by single steps of DOP853 on the same grid, and so does a lane anew that has met an event, or whose
-discrete state a sample of the control has changed.  A lane flies by them as long as the derivative of a position is
-another than its rate, such as after a landing.
+A flight begins with single steps of DOP853 on the same grid.  So does a lane after an event, or after a control sample
+that changes its discrete state.  A lane continues with these steps while the derivative of a position differs from its
+rate, such as after a landing.
 
 M. Berry, L. Healy, Implementation of Gauss-Jackson integration for orbit propagation, Journal of the Astronautical
 Sciences 52 (2004) 331-357: summed, in terms of the accelerations themselves ("ordinate form").
@@ -45,9 +45,9 @@ Past = namedtuple("Past", "accelerations newest known first second first_lost se
 
 
 def sum_weights(n: int, predicted: bool) -> tuple[list[Fraction], list[Fraction]]:
-    """Weights of n accelerations, newest first, beside the first sum in a rate, beside both sums in a position.
+    """Two lists of weights of n accelerations, newest first: those added to the sum in a rate, and in a position.
 
-    predicted : at the grid point after the newest acceleration, else at that of the newest.
+    predicted : True: at the grid point after the newest acceleration; False: at that of the newest.
     With D f the backward difference, h the step: rate / h = sum f + weights f; position / h^2 = sum sum f + weights f,
     where the second sum ends at the newest acceleration if predicted, else one before it.
 
@@ -132,7 +132,7 @@ added = compile_inline(_added)
 
 
 def _advance(f, tables, past, t, finish, h, s, m, p, o, flying):
-    """(State at the end of a grid step, past): by DOP853 in lanes that do not know enough accelerations yet."""
+    """(State at the end of a grid step, past): by DOP853 in lanes with too few past accelerations."""
     columns, ahead, present, n, positions_of, rates_of, in_order = tables[4:]
     slope = spread(f.rhs(t, s, m, p, o), t)
     acceleration = rates_of(slope)

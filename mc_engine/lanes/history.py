@@ -1,13 +1,13 @@
-"""Rows of time histories, written by the loops: each lane has rows of its own, at its own steps, events and samples.
+"""Rows of time histories, written by the loops: each lane has its own rows, at its own steps, events and samples.
 
-A sample of the control has two rows of one time, before and after it; an event has three, before and twice after, which
-tells it apart.  Rows that find no room are counted all the same: a flight with room for one row tells how many it has.
+A control sample has two rows at the same time, before and after it.  An event has three, one before and two after, by
+which it is recognised.  Rows beyond the space are counted too, so a flight with space for one row finds their number.
 
 history : float64[n_lanes * (1 + n_quantities), n_rows], for each lane the times [s] and every output, each contiguous
 rows : int64[n_lanes], how many rows each lane has so far
 
-Lanes beyond these record nothing, and so does a flight with an empty history.  A flight with a history has no more
-cases than lanes, since a lane would add the rows of its next case to those of the first.
+Further lanes record nothing, nor does a flight with an empty history.  A flight with a history has no more cases than
+lanes, because a lane would add the rows of its next case to those of the first.
 """
 
 from mc_engine.lanes.adaptive_step import glance

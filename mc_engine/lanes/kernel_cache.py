@@ -1,12 +1,12 @@
 """Kernels as machine code: kept on disk, loaded by LLVM, called through their address.
 
-Nothing of numba is needed to load and to call a kernel: importing it takes longer than many a flight.  It is imported
-where a kernel has to be compiled (`mc_engine.lanes.compiler`).
+A kernel is loaded and called without numba, whose import takes longer than many a flight.  numba is imported only to
+compile a kernel (`mc_engine.lanes.compiler`).
 
-Each file holds the machine code of one kernel and a digest, which is checked before loading: damaged machine code may
-crash or give wrong numbers.  The file's name contains all that the kernel was compiled for.  Files are replaced as a
-whole.  A file that cannot be read or written costs a compilation and ends no flight.  A lock per file keeps two
-processes from compiling the same kernel.
+Each file holds the machine code of one kernel and its digest.  The digest is checked before loading, because damaged
+machine code may crash or give wrong numbers.  The file name identifies all that the kernel was compiled for.  Files are
+replaced as a whole.  If a file cannot be read or written, the kernel is compiled, and the flight continues.  A lock per
+file prevents two processes from compiling the same kernel.
 """
 
 import ctypes

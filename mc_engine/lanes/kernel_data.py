@@ -1,10 +1,10 @@
-"""Numbers that physics reads by the name of an object, such as those of a curve, and that kernels are handed in a call.
+"""Data that physics reads by the name of an object, such as the points of a curve, and that a kernel gets in its call.
 
-A `DataBlock` is such an object.  Machine code knows only its place among the blocks of the kernel, so that other
-numbers compile nothing: a kernel takes all its blocks in one array, made by `gathered`, and `hand_over` keeps its
-address for the call (see `call_frame`).
+A `DataBlock` is such an object.  Machine code contains only its index among the blocks of the kernel, so other numbers
+need no compilation.  A kernel takes all its blocks in one array, made by `gathered`, and `hand_over` keeps the address
+of the array during the call (see `call_frame`).
 
-In lanes the numbers that lie next to each other are read together: one load a lane gives all of them.
+In lanes, adjacent numbers are read together, by one load for each lane.
 """
 
 import itertools

@@ -1,13 +1,13 @@
-"""The digest that names a compiled kernel: of what the compiler reads, and of nothing else.
+"""The digest that names a compiled kernel: of everything that the compiler reads, and of nothing else.
 
 numba compiles a function from its bytecode, and takes the values of global names, closures and default arguments as
-constants.  `kernel_key` follows the function objects of a model in the same way.  Comments, docstrings, line numbers,
-descriptions, file names and folders do not enter, nor do numbers that reach a kernel as arguments: parameters,
-settings, tables, curves and the clock's times.  Function names of `mc_engine.lanes` stand for the digest of its
-sources, names of Python's and NumPy's own functions for their versions.
+constants.  `kernel_key` follows the function objects of a model in the same way.  The digest does not depend on
+comments, docstrings, line numbers, descriptions, file names and folders, nor on numbers that reach a kernel as
+arguments: parameters, settings, tables, curves and the clock's times.  Functions of `mc_engine.lanes` are represented
+by the digest of its sources, functions of Python and NumPy by their versions.
 
-An object that the walk does not know, such as an enumeration or a function of a C library, is reported.  The caller
-then names the kernel by all of the model's sources: it is compiled more often than it needs, never too seldom.
+An object that is not understood, such as an enumeration or a function of a C library, is reported.  The caller then
+names the kernel by all sources of the model: it is compiled more often than necessary, but never too seldom.
 """
 
 import builtins

@@ -1,4 +1,4 @@
-"""Access to single lanes: which of them differ, and columns of arrays, with which a lane takes the next case."""
+"""Access to single lanes: which of them differ, and columns of arrays, from which a lane takes its next case."""
 
 import functools
 from typing import Any

@@ -1,9 +1,9 @@
-"""A numba pipeline for functions that are used inside kernels only: it stops at LLVM's intermediate language.
+"""A numba pipeline for functions that are used only inside kernels: it stops at LLVM's intermediate language.
 
-numba links each function with all that it calls, optimises the whole and generates its machine code, then does so
-again for every function that calls it.  A kernel's parts are never called by themselves, so each is linked once, into
-the kernel, and optimised with it.  This halves the time of compilation and changes neither results nor speed.  It
-replaces internal steps of numba, in this file alone.
+numba links each function with all that it calls, optimises the whole and generates its machine code, and repeats this
+for every function that calls it.  The parts of a kernel are never called alone, so here each is linked once, into the
+kernel, and optimised with it.  This halves the compilation time and changes neither results nor speed.  Only this file
+replaces internal steps of numba.
 """
 
 from collections.abc import Iterable

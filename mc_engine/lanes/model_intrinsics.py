@@ -1,6 +1,6 @@
-"""Intrinsics that are made for one model: constants, picks of fields, and functions that are put together from its own.
+"""Intrinsics that are made for one model: constants, selections of fields, and functions composed of the model's own.
 
-A kernel takes them from `mc_engine.flight.kernel_parts`.  Their interpreted twins, of the same names, are in
+A kernel takes them from `mc_engine.flight.kernel_parts`.  Interpreted versions with the same names are in
 `mc_engine.flight.interpreted`.
 """
 

@@ -2,13 +2,13 @@
 
 "abm11" predicts by the explicit Adams formula of order 10 and corrects by the implicit one of order 11, from the same
 10 slopes (derivatives of the state) at the last grid points.  A step costs two right-hand sides, whatever the order.
-All slopes must belong to one smooth motion.  A flight begins by single steps of DOP853 on the same grid, and so does a
-lane anew that has met an event, or whose discrete state a sample of the control has changed.
+All slopes must belong to one smooth motion.  A flight begins with single steps of DOP853 on the same grid.  So does a
+lane after an event, or after a control sample that changes its discrete state.
 
 The methods are stable for short steps only.  An oscillation of w rad/s grows unless step times w is below 0.37, 0.26,
 0.18, 0.12, 0.075 for orders 8 to 12 (measured in tests/mc_engine/lanes/test_multistep.py).
 
-Outputs between grid points lie on the polynomial through the last looks at them, by their differences.
+Outputs between grid points are interpolated by the polynomial through their last values, by backward differences.
 
 E. Hairer, S. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., section III.1; a corrector one
 order above the predictor: L. Shampine, M. Gordon, Computer Solution of Ordinary Differential Equations (1975); the
@@ -88,9 +88,9 @@ def ring_columns(n: int) -> np.ndarray:
 
 
 def _of_differences(weights: list[Fraction]) -> list[float]:
-    """Weights of the backward differences of slopes that stand for the slopes, besides the newest slope itself.
+    """Weights of the backward differences of slopes that replace the slopes, other than the newest slope.
 
-    A difference is a small part of a slope and its weight is smaller, so the sum is rounded several times more finely.
+    Differences are much smaller than slopes, and so are their weights, which reduces the rounding error several times.
     """
     return [float(-sum(weights[i:])) for i in range(1, len(weights))]
 
@@ -144,7 +144,7 @@ single = compile_callable(_single)
 
 
 def _advance(f, tables, past, t, finish, h, s, m, p, o, flying):
-    """(State at the end of a grid step, past): by DOP853 in lanes that do not know enough slopes yet."""
+    """(State at the end of a grid step, past): by DOP853 in lanes with too few past slopes."""
     columns, ahead, behind, at_end, n = tables[4:]
     slope = spread(f.rhs(t, s, m, p, o), t)
     newest = (past.newest if past.newest > 0 else n) - 1
@@ -250,13 +250,13 @@ def _largest_size(largest, difference, mask):
 
 @physics
 def _smooth_where_faded(smooth, before, last, most, bend, change):
-    """`smooth` where the last differences are small, and the newest looks bend as those one look earlier; else 0."""
+    """`smooth` where the last differences are small and the newest curvature is like the one before; else 0."""
     alike = (bend >= 0.0) | (bend >= extrema.ALIKE * (bend - change))
     return where((last <= most * before) & alike, smooth, 0.0)
 
 
 def _smooth_of_differences(differences, count, smooth):
-    """`smooth` of outputs whose differences fade with their order; 0 where a jump or a corner is among the looks."""
+    """`smooth` of outputs whose differences decrease with their order; 0 if their values contain a jump or corner."""
     n = minimum(count, float(LOOKS))
     late = n - where(n < _FEW, 1.0, where(n < float(LOOKS), 2.0, 3.0))
     most = where(n < _FEW, _FADED_OF_FEW / (n - 3.0), _FADED)

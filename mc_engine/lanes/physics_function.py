@@ -1,9 +1,8 @@
 """The decorator of compiled physics.
 
-`physics` marks a function that is written once on plain numbers.  Called from Python it simply runs, on floats, with
-which 1/0 is infinite as in kernels, or on NumPy arrays; used inside a kernel it is compiled for one case and for
-vectors of cases.
-Nothing is compiled, and numba is not imported, before a kernel asks for it.
+`physics` marks a function that is written once, on plain numbers.  Called from Python, it is interpreted, on floats or
+NumPy arrays; 1/0 of floats is infinite, as in kernels.  Inside a kernel, it is compiled for one case and for vectors
+of cases.  Nothing is compiled, and numba is not imported, before a kernel needs it.
 """
 
 import functools
@@ -15,7 +14,7 @@ from mc_engine.lanes.number import are_numbers, as_in_kernels
 
 
 class PhysicsFunction:
-    """A function on numbers that kernels can compile.  `compiled` is its numba dispatcher."""
+    """A function on numbers that kernels can compile; made by `physics`.  `compiled` is its numba dispatcher."""
 
     def __init__(self, function: Callable[..., Any]):
         self.function = function

@@ -1,10 +1,10 @@
-"""Named tuples, classes and namespaces in kernels, as numba itself does not have them.  Registered on import.
+"""Named tuples, classes and namespaces in kernels, beyond what numba supports.  Registered on import.
 
-A named tuple that holds plain numbers in one place and lanes in another is one type: physics may return
-`State(s.v, 0.0)` in one branch and `State(s.v, s.x)` in the other, or begin a loop with a record of plain numbers.
+Fields of a named tuple may be plain numbers in one place and lanes in another: physics may return `State(s.v, 0.0)` in
+one branch and `State(s.v, s.x)` in the other, or begin a loop with a record of plain numbers.
 
-A field that is left out has the default of its class, as in Python.  A field may be a record itself; `replace`,
-`merged` and `where` are here for records.
+A field that is left out has the default of its class, as in Python.  A field may be a record.  `replace`, `merged` and
+`where` for records are implemented here.
 
 Compiled code reads the attributes of classes and of `SimpleNamespace` as constants, as it does those of modules.
 """

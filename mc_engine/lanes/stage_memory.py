@@ -1,7 +1,7 @@
 """Memory for the stages of a Runge-Kutta step: derivatives of all lanes, and weighted sums of them.
 
-A high-order method has a dozen stages.  Written out, each would carry a copy of the right-hand side and its own
-sums; with the stages in memory the step is a short loop, whatever the method, and compiles as fast as RK4.
+A high-order method has a dozen stages.  Written out, each would contain a copy of the right-hand side and its own
+sums.  With the stages in memory, the step of any method is a short loop, which compiles as fast as RK4.
 """
 
 from typing import Any

@@ -1,7 +1,7 @@
-"""Arithmetic on named tuples of lanes, and their way from and to arrays.  For the compiled loops only.
+"""Arithmetic on named tuples of lanes, and their transfer from and to arrays.  For the compiled loops only.
 
-The engine's loops know no field names: they add, select and store whole tuples.  Each function here is a
-numba intrinsic, so any tuple of any length works without generated source.
+The engine's loops do not use field names: they add, select and store whole tuples.  Each function here is a numba
+intrinsic, so tuples of any length work without generated source.
 """
 
 from collections.abc import Callable, Sequence
@@ -178,9 +178,9 @@ def total(typingctx, fields):
 
 @intrinsic
 def total_in_pairs(typingctx, fields):
-    """Sum of the fields, by sums of pairs: nothing waits for a chain as long as the tuple.
+    """Sum of the fields by pairs, which is faster than a chain of additions as long as the tuple.
 
-    Where only the sign of infinity or not a number counts; a `total` has its rounding, on which results rest.
+    Use it only to test whether the sum is finite: results depend on the rounding of `total`, which differs.
     """
 
     def codegen(context, builder, sig, args):
