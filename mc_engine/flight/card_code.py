@@ -1,15 +1,14 @@
-"""From a kernel for one case at a time to the code of a card's thread, in NVIDIA's assembly language PTX.
+"""Code for the threads of a graphics card, in NVIDIA's assembly language PTX, from a kernel for one case at a time.
 
-The code is the kernel's LLVM IR behind an entry that finds its case.  The entry takes a row of 8-byte words: the number
-of cases, then one word for each number that the kernel takes, in its order, where an array is its address and its
-shape.  A thread has the number of one case, and shifts by it the addresses of the arrays that hold one number a case.
-The kernel sees arrays with one case.  Time histories are cut out: the kernel is told that there is no room for any.
+The code is the kernel's LLVM IR, called by an entry that selects the case of the thread.  The entry takes a row of
+8-byte words: the number of cases, then one word for each number that the kernel takes, in its order; an array is its
+address and its shape.  A thread has the index of one case.  It adds this index to the addresses of the arrays that hold
+one number a case, so that the kernel sees arrays with one case.  Time histories are left out: their arrays are empty.
 
-The IR is optimised here once, for the oldest cards.  From the result the back end that llvmlite brings writes PTX.
-Told that it may contract nothing, it writes each operation with its rounding, such as `mul.rn.f64`, and `fma.rn.f64`
-only where the IR has an fma; the assembler of the driver contracts only operations without a rounding.  So a card
-computes what a processor does, operation by operation.  What LLVM writes is checked: one operation without a rounding
-is an error.
+The IR is optimised once, for the oldest cards.  The back end of llvmlite writes PTX from the result, without permission
+to contract operations.  It then writes each operation with its rounding, such as `mul.rn.f64`, and `fma.rn.f64` only
+where the IR has an fma.  The assembler of the driver contracts only operations without a rounding.  So a card computes
+the same as a processor, operation by operation.  The PTX is checked: an operation without a rounding is an error.
 """
 
 import re

@@ -1,6 +1,6 @@
-"""A process that flies cases for a worker, as the worker sees it: orders, replies, and how it ended.
+"""A process that flies the cases of a simulator for one worker: its orders, its replies, and how it ended.
 
-Processes wait for the next chunk of their simulator, and are started anew where a case ended them.
+Between chunks a process waits for the next one.  If a case ends it, a new one is started.
 """
 
 import atexit

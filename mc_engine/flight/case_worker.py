@@ -1,7 +1,7 @@
-"""The process that flies the cases of a simulator for one worker: a crash, a leak or a hang of a case costs that case.
+"""The process that flies a simulator's cases for one worker: a crash, leak or hang of a case costs only that case.
 
 `mc_engine.flight.case_process` starts it, sends orders through a socket and reads one reply for each case, or one for
-a batch.  What a case prints goes into files, of which the end is kept where the case fails.
+a batch.  The output of a case is written to files; if the case fails, the end of them is kept.
 """
 
 import errno
@@ -68,7 +68,7 @@ class Order:
 
 
 class Case:
-    """What the function of a simulator learns of its case, beside the inputs."""
+    """The second argument of a simulator's function: the case, without its inputs."""
 
     def __init__(self, noise: int, seed: int, work: Path, shared: Any):
         self.id = -1 if noise == NOMINAL_NOISE else noise
@@ -94,7 +94,7 @@ class Case:
 
 
 class BatchCase:
-    """The same for many cases at a time: arrays of `id` and `seed`, and a list of generators."""
+    """The second argument for many cases at a time: arrays of `id` and `seed`, and a list of generators."""
 
     def __init__(self, noise: np.ndarray, seed: int, work: Path, shared: Any):
         self.id = np.where(noise == NOMINAL_NOISE, -1, noise)

@@ -1,6 +1,6 @@
-"""Chunks of consecutive cases: drawn, flown and stored by one worker, which is a thread, a process or a remote machine.
+"""Chunks of consecutive cases: sampled, flown and stored by one worker: a thread, a process or a remote machine.
 
-A case's result depends on (campaign, sources, seed, case_id) alone, so neither chunk size nor workers change it.
+The result of a case depends only on (campaign, sources, seed, case_id), so not on the chunk size or the workers.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -43,7 +43,7 @@ def chunks_of(ranges: Iterable[tuple[int, int]], size: int) -> Iterator[tuple[in
 
 @dataclass(frozen=True)
 class Lost:
-    """A case that cannot be flown to an end: its worker dies of it, or it takes too long."""
+    """A case that cannot be completed: it kills its worker, or it takes too long."""
 
     case_id: int
     status: str
@@ -183,7 +183,7 @@ def fly_in_threads(
     workers: int,
     flyer: Flyer | None = None,
 ) -> Columns:
-    """The wanted columns of cases that are not the campaign's own, flown by some threads in pieces of whole blocks.
+    """The wanted columns of cases outside the campaign's design, flown by several threads in pieces of whole blocks.
 
     inputs : the dispersed columns.  noise : int64[n], what addresses the noise of each case.
     flyer : if another one than the campaign's own.
@@ -204,7 +204,7 @@ def fly_in_threads(
 
 
 def name_upstream(campaign: Campaign, case_ids: np.ndarray, flight: Columns) -> None:
-    """Say of cases that have nothing to start from what became of theirs upstream, where the nominal has completed."""
+    """Set the reason of cases that lack inputs from upstream to how the upstream case ended."""
     if campaign.upstream is not None and case_ids.min() != NOMINAL_CASE:
         reasons = campaign.upstream.refusals(upstream_ids(campaign, case_ids))
         flight["reason"] = np.where(reasons != "", reasons, flight["reason"])

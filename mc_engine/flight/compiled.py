@@ -1,4 +1,4 @@
-"""Compiled models as what flies a campaign's cases."""
+"""The `Flyer` of compiled models."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace

@@ -1,7 +1,7 @@
 """Checks of a model's contract that need no compilation.  Each breach is one sentence with its location and the fix.
 
-`mc_engine.model.reading` checks the source, `mc_engine.model.trial` runs the physics at the start of the nominal case.
-`mc_engine.flight.contract_flight` checks what only a flight can show.
+`mc_engine.model.reading` checks the source, and `mc_engine.model.trial` runs the physics at the start of the nominal
+case.  `mc_engine.flight.contract_flight` makes the checks that need a flight.
 """
 
 import json
@@ -24,7 +24,7 @@ _PATIENCE = 600.0  # s, for all flights and compilation; one case has a limit of
 
 
 def breaches(campaign: "Campaign") -> list[str]:
-    """Sentences on what is wrong with the campaign's model, as far as it shows without compiling; empty if nothing."""
+    """One sentence for each error in the campaign's model that is found without compiling; empty if there is none."""
     return source_faults(compiled_model(campaign.model)) or _trial_faults(campaign)
 
 

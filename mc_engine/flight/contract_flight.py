@@ -1,8 +1,8 @@
 """Checks of a model's contract by flying a few cases of its campaign several times.
 
-Results must exist and repeat, must be independent of the other cases in the batch, and every declared input, metric and
-event must have an effect.  `python -m mc_engine.flight.contract_flight FILE` prints the sentences as JSON; `check` runs
-it as a process of its own, which the model may kill or hang.
+Results must exist, repeat, and not depend on the other cases in the batch.  Every declared input must have an effect,
+every metric must vary, and every event must happen.  `python -m mc_engine.flight.contract_flight FILE` prints the
+sentences as JSON; `check` runs it as a separate process, because the model may crash or hang.
 """
 
 import json
@@ -56,7 +56,7 @@ _ROUNDED = 1e-6  # of a step: a billion steps as numbers of 16 digits miss `unti
 
 
 def faults(campaign: Campaign) -> list[str]:
-    """Sentences on what a flight of a few cases shows to be wrong; empty if nothing.
+    """One sentence for each error that a flight of a few cases shows; empty if there is none.
 
     A flight that takes far too long ends the process, after its sentence is printed as by `main`.
     """
@@ -120,9 +120,9 @@ def _length(campaign: Campaign) -> str:
 
 
 def _too_long(campaign: Campaign, nominal: Columns) -> list[str]:
-    """One sentence if the nominal case ends grossly elsewhere with half of the step of a multistep method.
+    """One sentence if the end state of the nominal case is grossly different with half the step of a multistep method.
 
-    Beyond the method's limit of stability errors grow at every step, and finite numbers that are absurd are ok.
+    Beyond the stability limit of the method errors grow at every step, but absurd numbers have status ok while finite.
     """
     model, (_, settings) = compiled_model(campaign.model), nominal_inputs(campaign)
     clock = model.clock

@@ -1,4 +1,4 @@
-"""Flight of cases: prepares them, runs the kernel, converts the results back."""
+"""Flight of cases: prepares them, runs the kernel, and converts the results to declared units."""
 
 from collections.abc import Callable, Iterator
 from functools import lru_cache, partial
@@ -42,9 +42,9 @@ def fly(
 ) -> dict[str, np.ndarray]:
     """Results of some cases as columns: status, reason, `end_...` states and metrics in declared units.
 
-    case_ids : int64[n], the addresses of the noise.  Cases of different settings may be mixed.
-    width : cases at a time, 1, 4, 8 or 16; by default what is fastest for the model.
-    clock : another one of the kind of the model's own; the kernel is the same.  build : see `Builder`.
+    case_ids : int64[n], which address the noise.  Cases with different settings may be mixed.
+    width : cases at a time, 1, 4, 8 or 16; by default the fastest for the model.
+    clock : an integrator of the same class, in place of the model's; the kernel is the same.  build : see `Builder`.
     """
     width = width or usual_width(model)
     ready = prepare(model, inputs, len(case_ids))
@@ -240,13 +240,13 @@ def fly_histories(
     width: int | None = None,
     rows: int = 1500,
 ) -> Iterator[tuple[dict[str, np.ndarray], dict[str, np.ndarray]]]:
-    """(columns, history) of each case, in their order.  As many as there are lanes fly together when one is asked for.
+    """(columns, history) of each case, in their order.  When one is asked for, as many as there are lanes fly together.
 
-    Their bits are the same whatever the width and whichever other cases fly with them.
+    Their bits do not depend on the width or on the cases that fly together.
 
     rows : of the history, see `mc_engine.store.histories.rows_to_keep`; fewer where a fixed grid has fewer steps
-    history : t_s and the model's outputs in declared units; empty if the case was refused.  Of a time with two rows
-        the first is before an event or a sample of the control, the second after it.
+    history : t_s and the model's outputs in declared units; empty if the case was refused.  If a time has two rows,
+        the first is before an event or a control sample, the second after it.
     """
     from mc_engine.store.histories import PHASE_COLUMN  # what `check` flies has no history
 
@@ -272,11 +272,11 @@ def fly_histories(
 
 
 class _Recorder:
-    """Flies cases of one settings together, each in a lane of its own, and keeps some rows of each.
+    """Flies cases with the same settings together, each in its own lane, and keeps some rows of each.
 
-    These rows are those of all steps of a flight if memory allows, and of adaptive steps so long that there are fewer
-    than wanted, also those of the parts that they are divided into.  The memory for them serves one batch after
-    another; where a batch has more rows than memory is meant for, it flies in pieces.
+    All steps of a flight are recorded if memory allows.  If adaptive steps are so long that there are fewer rows than
+    wanted, they are divided into parts, which are recorded too.  The same memory serves one batch after another; a
+    batch with more rows than fit is flown in pieces.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
-"""What flies a case: the one interface between the runner and a compiled model or a simulator.
+"""The only interface between the runner and what flies cases: a compiled model or a simulator.
 
-Inputs of a chunk of cases go in, as columns in declared units; columns of results, statuses and reasons come out, and
-the time histories of some.  The runner, the store and all studies know nothing else of what flies.
+It takes the inputs of a chunk of cases, as columns in declared units, and returns columns of results, statuses and
+reasons, and time histories of some cases.  The runner, the store and all studies use only this interface.
 """
 
 from abc import ABC, abstractmethod
@@ -35,14 +35,14 @@ def never() -> bool:
 class Flyer(ABC):
     """Flies the cases of one campaign.  Used by several threads at once.
 
-    batch : cases that fly together, of which one may end the worker of all.
-    histories_together : cases whose histories fly together.
-    chunks_per_worker : in a run, at least: enough for an even end, few enough that parts stay large.
-    smallest_chunk : cases that a worker flies at a time, at least.
-    largest_chunk : at most, since all their numbers are in memory.
+    batch : cases that fly together, so that one of them may end the worker of all.
+    histories_together : cases whose histories are flown together.
+    chunks_per_worker : least number in a run: enough that workers finish together, and few enough for large parts.
+    smallest_chunk : least number of cases that a worker flies at a time.
+    largest_chunk : largest number of them, since all their numbers are in memory.
     keeps_rows : a case may take long, so the row of each is recorded when it is complete, and a run that is stopped
         does not wait for the cases in flight.
-    most_workers : that may fly cases of this campaign at a time, as licences allow; None for any number.
+    most_workers : most workers that may fly cases of this campaign at a time, such as licences; None for no limit.
     tolerance : fraction by which the numbers of a replayed case may differ from those stored; None: bits are compared.
     """
 
@@ -97,11 +97,11 @@ class Flyer(ABC):
 
     @abstractmethod
     def faults(self) -> list[str]:
-        """Sentences on what is wrong with it, as far as it shows at once; empty if nothing."""
+        """One sentence for each error that is found without a flight; empty if there is none."""
 
     @abstractmethod
     def faults_in_flight(self, process: Process) -> list[str]:
-        """Sentences on what flights of a few cases show.
+        """One sentence for each error that flights of a few cases show.
 
         process : one of `mc_engine.flight.contract_flight`, which has loaded the campaign and waits to fly.
         """
@@ -115,7 +115,7 @@ class Flyer(ABC):
         """ModelError with the first fault, before anything is flown or written."""
 
     def differs(self, stored: Any, value: Any) -> bool:
-        """Whether a number of a replayed case is another one than stored: in any bit, or by more than `tolerance`."""
+        """Whether a number of a replayed case differs from the stored one: in any bit, or by more than `tolerance`."""
         if not isinstance(value, float | np.floating):
             return bool(stored != value)
         if self.tolerance is None:

@@ -1,4 +1,4 @@
-"""The choice of what flies a campaign's cases."""
+"""The choice of the `Flyer` of a campaign."""
 
 from mc_engine.campaign.loading import Campaign
 from mc_engine.flight.flyer import Flyer
@@ -6,7 +6,7 @@ from mc_engine.model.simulator import Simulator
 
 
 def flyer_of(campaign: Campaign) -> Flyer:
-    """What flies the cases of a campaign.  The compiler is loaded for a compiled model only."""
+    """The `Flyer` of a campaign's cases.  The compiler is loaded only for a compiled model."""
     if isinstance(campaign.model, Simulator):
         from mc_engine.flight.simulated import SimulatorFlyer
 

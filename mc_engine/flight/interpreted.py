@@ -1,7 +1,7 @@
-"""The engine's integration loops run by Python on one case: to find what made a number not finite, to trace, to debug.
+"""The engine's integration loops, run by Python on one case: to find what made a number not finite, to trace, to debug.
 
-The loops are the ones that kernels are compiled from.  Their intrinsics exist in compiled code only, so each has an
-interpreted twin of the same name here.
+Kernels are compiled from the same loops.  Their intrinsics exist only in compiled code, so this module has an
+interpreted version of each, with the same name.
 """
 
 import functools

@@ -1,8 +1,8 @@
 """The compiled kernel of a model: assembled from its physics and the engine's loop, cached on disk.
 
-Every kernel has a small source file of its own, in a folder named by the digest of what the kernel is compiled from
-(`mc_engine.lanes.kernel_key`), and beside it its machine code.  Models that compile to the same code share a kernel,
-wherever they lie.
+Every kernel has its own small source file, with its machine code, in a folder named by the digest of everything that
+the kernel is compiled from (`mc_engine.lanes.kernel_key`).  Models that compile to the same code share a kernel, also
+if they are in different folders.
 """
 
 import errno
@@ -140,10 +140,11 @@ def registers() -> Registers:
 
 
 def usual_width(model: Model) -> int:
-    """How many cases of a model fly at a time: a register of them, or two, which hide the waiting of one another.
+    """How many cases of a model fly at a time: as many as fill one vector register, or two, which hide latencies.
 
-    With few values to hold, two registers a number are up to a third faster; with many they are not, and of 16 they
-    take up to 1.5 times as long.  Adaptive steps hold the events and extrema too.  The results have the same bits.
+    For models with few values, two registers a number are up to a third faster.  For models with many values they are
+    not, and of 16 registers they take up to 1.5 times as long.  Adaptive steps hold the events and extrema too.  The
+    results have the same bits.
     """
     doubles, few_fixed, few_adaptive = registers()
     if isinstance(model.clock, AdaptiveStep):
@@ -200,7 +201,7 @@ def _template(model: Model) -> str:
 def _write_source(path: Path, text: bytes) -> None:
     """Write the source of a kernel, unless it is there.
 
-    It is for people, and for messages of the compiler: what runs is `text`, also where the disk refuses the file.
+    The file serves readers, and messages of the compiler.  `text` is what runs, also if the file cannot be written.
     """
     make_kernel_folder(path.parent)
     with suppress(OSError):

@@ -1,4 +1,4 @@
-"""The first operation of a flight whose result is infinite or NaN, as a sentence: file, line, source and operands."""
+"""The first operation of a flight with an infinite or NaN result, as a sentence: file, line, source and operands."""
 
 import math
 from collections.abc import Mapping

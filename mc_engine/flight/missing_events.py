@@ -1,4 +1,4 @@
-"""Events that never happen in the flights of a few cases: the line of the model, and what their functions do."""
+"""Events that never happen in the flights of a few cases: the line of the model, and the range of their functions."""
 
 import ast
 from collections.abc import Iterator, Mapping
@@ -37,8 +37,8 @@ def events_that_never_happen(
 ) -> Iterator[str]:
     """Sentences on events that happen in none of the cases, of which at least one completes.
 
-    The nominal case counts, too: flown by Python it shows most events, and only for those that it leaves open a kernel
-    is compiled that watches them in all cases.
+    The nominal case is flown first, by Python, and shows most events.  Only for the others is a kernel compiled, which
+    watches them in all cases.
     """
     model = compiled_model(campaign.model)
     stops = [event for event in model.event_list if event.action == "stop"]

@@ -1,4 +1,4 @@
-"""Flight of one case by a program: its files, its start, its limits, its results, and what it leaves behind."""
+"""Flight of one case by a program: its files, its start, its limits, its results, and the files that it leaves."""
 
 import csv
 import io

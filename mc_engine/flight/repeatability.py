@@ -1,7 +1,7 @@
-"""The nominal inputs as physics receives them, and whether inputs and results repeat: in every process and batch.
+"""Check that inputs and results repeat in every process and batch; and the nominal inputs as physics receives them.
 
 `check` computes the same digests in two processes, at two times, with different hash seeds and time zones.  Values that
-differ depend on the clock, randomness or the environment.
+differ depend on the clock, on randomness or on the environment.
 """
 
 import inspect

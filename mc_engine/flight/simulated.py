@@ -1,4 +1,4 @@
-"""Simulators as what flies a campaign's cases: each worker has them flown in a process of its own."""
+"""The `Flyer` of simulators: each worker has its cases flown in a process of its own."""
 
 import os
 import threading
