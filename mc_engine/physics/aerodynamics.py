@@ -1,6 +1,6 @@
 """Lift and axial force of a vehicle at its trim angle of attack, lift of the parts of a slender rocket, parachutes.
 
-Coefficients that go by the Mach number are curves, see `mc_engine.physics.curves`.
+Coefficients that depend on the Mach number are curves, see `mc_engine.physics.curves`.
 """
 
 from math import pi
@@ -13,11 +13,11 @@ FADING = 0.01  # rad from the vertical
 
 @physics
 def lift_direction(vx, vy, vz, ux, uy, uz, speed, cos_bank, sin_bank):
-    """Unit vector of the lift, across the velocity v.
+    """Unit vector of the lift (x, y, z), perpendicular to the velocity v.
 
-    u : unit vector up;  speed : length of v.  At bank 0 the lift is in the vertical plane and points up, at 90 degrees
-    it is level and points to the right of the flight.  In vertical flight that has no meaning: within 0.01 rad of the
-    vertical the vector becomes shorter, down to nothing.
+    u : unit vector up;  speed : length of v.  At bank 0 the lift is in the vertical plane and points up; at 90 degrees
+    it is horizontal and points to the right of the flight.  The bank is undefined in vertical flight, so the length of
+    the vector decreases to zero within 0.01 rad of the vertical.
     """
     rx, ry, rz = vy * uz - vz * uy, vz * ux - vx * uz, vx * uy - vy * ux  # to the right, as long as the level speed
     level = maximum(sqrt(rx * rx + ry * ry + rz * rz), FADING * speed)
@@ -39,11 +39,11 @@ def axial_coefficient(drag_coefficient, lift_coefficient, cos_trim, sin_trim):
 
 @physics
 def lift_of_part(density, stream, rate, place, area):
-    """(force [N], moment [N m] about the centre of mass) of the lift of a part of a rocket with z to the nose.
+    """(force [N], moment [N m] about the centre of mass) of the lift of a rocket's part, in body axes, z to the nose.
 
-    stream : velocity [m/s] of the air against the centre of mass, in body axes;  rate : of the body [rad/s]
-    place : of the part's centre of pressure before the centre of mass [m]
-    area : of reference times the slope of the lift coefficient by the angle of attack [m^2/rad]
+    stream : velocity [m/s] of the air relative to the centre of mass, in body axes;  rate : of the body [rad/s]
+    place : distance of the part's centre of pressure ahead of the centre of mass [m]
+    area : reference area times the slope of the lift coefficient over the angle of attack [m^2/rad]
     J. S. Barrowman, The practical calculation of the aerodynamic characteristics of slender finned vehicles (1967).
     """
     own = Vector(stream.x - rate.y * place, stream.y + rate.x * place, stream.z)
@@ -54,13 +54,13 @@ def lift_of_part(density, stream, rate, place, area):
 
 @physics
 def fins_lift_area(mach, number, span, root, tip, radius):
-    """Area times the slope of the lift coefficient [m^2/rad] of equal trapezoidal fins on a round body.
+    """Reference area times the slope of the lift coefficient [m^2/rad] of equal trapezoidal fins on a round body.
 
-    number : of the fins, three or four;  span : of one, from the body to its tip;  root, tip : chords, of fins whose
-    trailing edge is square to the body;  radius : of the body [m]
+    number : of the fins, three or four;  span : of one fin, from the body to its tip [m];  root, tip : chords [m];
+    radius : of the body [m].  The trailing edge is perpendicular to the body.
 
-    One fin: F. W. Diederich, NACA TN 2335 (1951), with Prandtl and Glauert's factor, between Mach 0.8 and 1.1 that of
-    Mach 0.8; all of them on a body: Barrowman, as above.
+    One fin: F. W. Diederich, NACA TN 2335 (1951), with the Prandtl-Glauert factor, which from Mach 0.8 to 1.1 is that
+    of Mach 0.8; all fins on a body: Barrowman, as in `lift_of_part`.
     """
     sweep = 0.5 * (root - tip) / span  # tangent, of the line at half chord
     beta = sqrt(where(mach < 0.8, 1.0 - mach * mach, where(mach < 1.1, 0.36, mach * mach - 1.0)))
@@ -70,10 +70,10 @@ def fins_lift_area(mach, number, span, root, tip, radius):
 
 @physics
 def parachute_acceleration(density, stream, mass, area, gravity):
-    """Acceleration [m/s^2] of a mass [kg] under an open parachute, which takes half a sphere of air along.
+    """Acceleration [m/s^2] of a mass [kg] under an open parachute, with the added mass of half a sphere of air.
 
-    stream : velocity of the air against it [m/s], z up;  area : drag area [m^2], of a drag coefficient of 1.4;
-    gravity : down [m/s^2].  As RocketPy 1.13 has it (G. H. Ceotto et al., J. Aerosp. Eng. 34(6), 2021).
+    stream : velocity of the air relative to it [m/s], z up;  area : drag area [m^2], of a drag coefficient of 1.4;
+    gravity : down [m/s^2].  As in RocketPy 1.13 (G. H. Ceotto et al., J. Aerosp. Eng. 34(6), 2021).
     """
     moving = mass + 2.0 / 3.0 * pi * density * sqrt(area / (1.4 * pi)) ** 3
     pull = scaled(0.5 * density * area * norm(stream) / moving, stream)

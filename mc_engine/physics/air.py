@@ -1,8 +1,7 @@
-"""The standard air: density, pressure, temperature and speed of sound over altitude, and what a flow does to a body.
+"""The standard air: density, pressure, temperature and speed of sound over altitude; dynamic pressure.
 
-`us76_air` is exact to 86 km, where bodies feel the air; above it is a table of densities and pressures.  See
-`mc_engine.physics.atmosphere` for densities alone and other planets, `wind_profile` of `mc_engine.physics.curves` for
-wind.
+`us76_air` follows the standard exactly up to 86 km, and its tables of density and pressure above.  For densities alone
+and for other planets see `mc_engine.physics.atmosphere`, for wind `wind_profile` of `mc_engine.physics.curves`.
 """
 
 import math
@@ -45,13 +44,13 @@ _BASE, _A, _C = _aloft_constants()
 
 @physics
 def us76_air(h):
-    """Air of the U.S. Standard Atmosphere, 1976, at geometric altitude h [m].
+    """Air of the U.S. Standard Atmosphere, 1976, at geometric altitude h [m], in SI.
 
-    To 86 km p = rho R T and a^2 = 1.4 R T, the lowest layer going on below the ground; T is the molecular-scale
-    temperature, which leaves the kinetic one above 80 km and is 0.04 % higher at 86 km.  Above, the densities
-    and pressures of table I, their logarithms linear in between and going on in line beyond 200 km, where the density
-    is far too thin (see `us76_logarithm`); temperature and speed of sound are then those of 86 km: the standard defines
-    no speed of sound there.
+    Up to 86 km p = rho R T and a^2 = 1.4 R T; below the ground the lowest layer is extended.  T is the molecular-scale
+    temperature, which differs from the kinetic one above 80 km and is 0.04 % higher at 86 km.  Above 86 km densities
+    and pressures are those of table I, with their logarithms interpolated linearly.  They are extrapolated beyond
+    200 km, where the density is far too low (see `us76_logarithm`).  Temperature and speed of sound stay at their
+    values at 86 km, as the standard defines no speed of sound above.
     """
     logarithm, _, temperature = us76_logarithm(h)
     a, c = _A[0], _C[0]

@@ -1,9 +1,9 @@
 """Atmospheric density models: one function per model, density in kg/m^3.
 
-`exponential` is one layer, and with EXPONENTIALS the textbook atmosphere of a planet.  `layered` joins the layers of
-Vallado's table from 100 to 700 km and is for orbits and de-orbit arcs (tens of percent of day-to-day variation are
-not modelled).  `us76` is for entry: the 1976 standard, exact from the ground to 86 km, tabulated above, and far too
-thin for orbits beyond 200 km.
+`exponential` is a single layer; EXPONENTIALS has its numbers for several planets.  `layered` joins the layers of
+Vallado's table from 100 to 700 km and is for orbits and de-orbit arcs; the variation of tens of percent from day to day
+is not modelled.  `us76` is for entry: the 1976 standard, exact from the ground to 86 km, tabulated above, and with far
+too low a density for orbits beyond 200 km.
 """
 
 import math
@@ -49,7 +49,7 @@ def exponential(h, rho_ref, h_ref, scale_height):
 
 @physics
 def layered(h):
-    """Density [kg/m^3] at altitude h [m] from Vallado's Table 8-4; the end layers go on below and above it."""
+    """Density [kg/m^3] at altitude h [m] from Vallado's Table 8-4; its end layers are extended below and above it."""
     rho, base, scale = _RHO[0], _H[0], _SCALE[0]
     for i in range(1, len(_H)):
         inside = h >= _H[i]
@@ -131,10 +131,10 @@ _ALOFT_BASE, _ALOFT_A, _ALOFT_C = tuple(zip(*_ALOFT, strict=True))
 def us76_logarithm(h):
     """(ln rho, its slope [1/m], molecular-scale temperature [K]) at geometric altitude h [m].
 
-    U.S. Standard Atmosphere, 1976, eqs (18), (23), (33a), (33b): exact to 86 km.  Above, its tabulated densities, the
-    logarithm linear in between: up to 8 % too dense to 150 km, up to 15 % to 200 km.  Beyond, it goes on in line: a
-    fifth of the standard's density at 300 km, a fiftieth at 400 km; take `layered` there.  The temperature is that of
-    86 km from there on, which serves for a Mach number and nothing else.  The lowest layer goes on below the ground.
+    U.S. Standard Atmosphere, 1976, eqs (18), (23), (33a), (33b): exact to 86 km.  Above, its tabulated densities with
+    linear interpolation of the logarithm: up to 8 % too high to 150 km, up to 15 % to 200 km.  Beyond, it is
+    extrapolated: a fifth of the standard's density at 300 km, a fiftieth at 400 km; use `layered` there.  Above 86 km
+    the temperature is constant, fit only for a Mach number.  Below the ground the lowest layer is extended.
     """
     # both sides of 86 km are computed, so the altitude of each stays within its own
     low = minimum(h, US76_TOP)
@@ -163,7 +163,7 @@ def us76(h):
 
 
 def us76_of_array(h: np.ndarray) -> np.ndarray:
-    """The same density for float64[...] by NumPy alone, to the last digits but one: for designs before a flight."""
+    """Density [kg/m^3] as `us76`, to nearly all digits, for float64[...] h [m].  NumPy: for designs before a flight."""
     low = np.minimum(h, US76_TOP)
     x = GEOPOTENTIAL_RADIUS / (GEOPOTENTIAL_RADIUS + low) * low
     t0, lapse, a, b, c = np.array(_LAYERS)[np.maximum(np.searchsorted(_BASE, x, "right") - 1, 0), 1:].T

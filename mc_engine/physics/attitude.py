@@ -32,7 +32,7 @@ def second_axis_in_body(q0, q1, q2, q3):
 
 @physics
 def turned_slightly(q0, q1, q2, q3, x, y, z):
-    """Vector part of q after a further rotation by the small angles x, y, z [rad] in body axes, to first order."""
+    """Vector part of q after a further rotation by the small angles x, y, z [rad] about body axes, to first order."""
     x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
     return q1 + (q0 * x + (q2 * z - q3 * y)), q2 + (q0 * y + (q3 * x - q1 * z)), q3 + (q0 * z + (q1 * y - q2 * x))
 

@@ -1,5 +1,5 @@
-"""Points of curves and surfaces: read from a CSV or Parquet file, in SI by the units in the names of its columns, held
-to what a curve needs, and made into what a look-up reads: a row of numbers for each point, or each cell of a grid."""
+"""Points of curves and surfaces: read from a CSV or Parquet file, converted to SI by the units of its columns, checked,
+and arranged for the look-up: a row of numbers for each point, or for each cell of a grid."""
 
 import os
 import sys
@@ -23,9 +23,9 @@ def columns_of(
 ) -> dict[str, np.ndarray]:
     """float64[n_rows], SI, of each wanted column.
 
-    wanted : names of columns, each with its unit, or with None: then the end of its name says it, such as _km_s, and a
-        single word, such as mach, is a plain number.
-    said : by column, what a user writes to say a unit.
+    wanted : names of columns, each with its unit, or with None: then the ending of its name is the unit, such as _km_s,
+        and a single word, such as mach, is a plain number.
+    said : for error messages, by column, how a user states a unit.
     Raises ModelError where the file, a column, a unit or a number is missing; FileNotFoundError as `open` does.
     """
     columns = _parquet(path) if path.suffix == ".parquet" else _csv(path)
@@ -41,9 +41,9 @@ def columns_of(
 def si_factor(name: str, unit: str | None = None, said: Callable[[str], str] = str) -> float:
     """SI value of one unit of a column.
 
-    unit : by default what the name ends in; the longest ending counts.  A single word, such as mach, has none.
-    said : what a user writes to say a unit.
-    Raises ModelError where `unit` is none, and where a name of several words ends in none or in what may be two.
+    unit : by default the ending of the name, of which the longest counts.  A single word, such as mach, has no unit.
+    said : for error messages, how a user states a unit.
+    Raises ModelError for an unknown unit, and if a name of several words ends in no unit or its ending fits two units.
     """
     if unit is not None:
         if unit not in UNITS:
@@ -113,9 +113,9 @@ def path_beside_caller(file: object) -> Path:
 
 
 def array_of(values: Any, name: str, unit: str | None = None, dimensions: int = 1) -> np.ndarray:
-    """The numbers of an argument, in SI.  unit : that they are in, None for SI.
+    """The numbers of an argument, in SI.  unit : of the numbers given, None for SI.
 
-    Raises ModelError for the name of a column, where there is no file, and for what is not so many rows of numbers.
+    Raises ModelError for the name of a column without a file, and for a wrong number of dimensions.
     """
     if isinstance(values, str):
         raise ModelError(f'"{values}" is a column, but there is no file; give {name} as numbers')
@@ -149,7 +149,7 @@ def refuse_points(words: str, x: np.ndarray, values: np.ndarray, n: int) -> None
 
 
 def finite_rows(words: str, rows_of: Callable[..., np.ndarray], *points: np.ndarray) -> np.ndarray:
-    """What a look-up reads, made by `rows_of`; ModelError where points lie so close that a number of it is infinite."""
+    """The rows that a look-up reads, made by `rows_of`; ModelError if points are so close that one is infinite."""
     with np.errstate(all="ignore"):
         rows = rows_of(*points)
     if not np.isfinite(rows).all():
@@ -158,7 +158,7 @@ def finite_rows(words: str, rows_of: Callable[..., np.ndarray], *points: np.ndar
 
 
 def grid_of(words: str, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points of both axes and values [n_x, n_y] of rows in any order."""
+    """(x, y, values [n_x, n_y]): both axes and the values of a grid, from rows in any order."""
     xs, at_x = np.unique(x, return_inverse=True)
     ys, at_y = np.unique(y, return_inverse=True)
     values = np.full((xs.size, ys.size), np.nan)
@@ -172,12 +172,12 @@ def grid_of(words: str, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np
 
 
 def linear_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """(value, slope behind it) of each point; the last one has no slope, as nothing is behind it."""
+    """(value, slope to the next point) of each point; the slope of the last one is 0."""
     return np.column_stack([y, np.append(np.diff(y) / np.diff(x), 0.0)])
 
 
 def cubic_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Coefficients of the powers of the way from each point."""
+    """Coefficients of the powers of the distance from each point."""
     h = np.diff(x)
     m = np.diff(y) / h
     d = _slopes(h, m)

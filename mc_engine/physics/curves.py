@@ -3,10 +3,10 @@
     THRUST = curve("thrust.csv", x="time_s", y="thrust_n", outside="zero")
     CD = surface("cd.csv", "mach", "alpha_deg", "cd")
 
-and in physics `THRUST(t)`, `CD(mach, alpha)`, in SI and radians: the unit is in the name of a column.  The points may
-lie at any distances and are met exactly; nothing is resampled.  The numbers lie outside of the machine code, so other
-numbers compile nothing.  The range is divided into equal buckets, so that two comparisons, seldom more, find the points
-on both sides of an argument (see `_axis`).  An argument that is not a number gives one that is not.
+and in physics `THRUST(t)`, `CD(mach, alpha)`, in SI and radians: the name of a column ends in its unit.  The points may
+have any spacing and are reproduced exactly; nothing is resampled.  The numbers are not part of the machine code, so new
+numbers need no compilation.  The range is divided into equal buckets, so that two comparisons, seldom more, find the
+points on both sides of an argument (see `_axis`).  A NaN argument gives NaN.
 """
 
 import math
@@ -81,15 +81,17 @@ def curve(
 ) -> Curve:
     """A function y(x) through points.
 
-    file : CSV or Parquet, named from the folder of the module that calls; x and y are then names of columns, whose
-        ends say their units unless x_unit or y_unit does.  Without a file, x and y are numbers, in x_unit and y_unit,
-        or else in SI.
-    x : rising, at least two points.  All numbers are finite.
+    file : CSV or Parquet, relative to the folder of the calling module; x and y are then names of columns.  Their units
+        are x_unit and y_unit, or else the endings of the names.  Without a file, x and y are numbers, in x_unit and
+        y_unit, or else in SI.
+    x : strictly increasing, at least two points.  All numbers are finite.
     kind : "linear"; "cubic", smooth (continuous slope) and monotone where the points are (PCHIP, F. N. Fritsch and
         J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304); "nearest", of two equally near points the lower one.
-    outside : of the points: "held" at the first and the last value, "zero", or "ends": the value is not a number, with
-        which the case ends as "not-finite".
-    Raises ModelError for what is wrong with the file or the points.
+    outside : the value outside the points: "held", the first or the last value; "zero"; or "ends": NaN, so that the
+        case ends as "not-finite".
+
+    Returns a Curve, called in physics as y(x), in SI.
+    Raises ModelError for errors in the file or the points.
     """
     _refuse_unknown(kind, KINDS, "kind")
     _refuse_unknown(outside, OUTSIDE, "outside")
@@ -120,9 +122,9 @@ def wind_profile(
 ) -> PhysicsFunction:  # fmt: skip
     """wind(h) -> Vector, velocity of the air over the ground [m/s] at altitude h [m]: north, east, down (zero).
 
-    file, kind, outside : as in `curve`; the other arguments are names of columns.  Either north and east are given, the
-    components, or speed and coming_from, the direction that the wind blows from, clockwise from north.  Components are
-    what is interpolated, so that 350 and 10 degrees have north between them, with a speed a little below both.
+    file, kind, outside : as in `curve`; the other arguments are names of columns.  Give either the components north and
+    east, or speed and coming_from, the direction that the wind blows from, clockwise from north.  The components are
+    interpolated: between 350 and 10 degrees the wind is from the north, with a speed a little below both.
     """
     path = path_beside_caller(file)
     wanted = [name for name in (altitude, north, east, speed, coming_from) if name]
@@ -150,11 +152,11 @@ def surface(
     outside: str = "held",
     units: dict[str, str] | None = None,
 ) -> Curve:
-    """A function z(x, y) through the points of a grid.
+    """A function z(x, y) through the points of a grid, called in physics in SI.
 
     file : CSV or Parquet as in `curve`, one row for each point of the grid, in any order.
-    units : by column, of those whose names do not say theirs.
-    Without a file, x and y are rising numbers and z is float64[n_x, n_y], in SI or in the units of "x", "y", "z".
+    units : units of columns whose names do not end in one, by column.
+    Without a file, x and y are increasing numbers and z is float64[n_x, n_y], in SI or in the `units` of "x", "y", "z".
     kind : "linear" in each direction (bilinear); "cubic" in each (bicubic), smooth (continuous slopes), and along the
         lines of the grid the cubic curve through their points; or "nearest".
     outside : as in `curve`.

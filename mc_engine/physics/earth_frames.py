@@ -1,17 +1,17 @@
-"""Frames at the turning Earth: inertial, Earth-fixed, geodetic, north-east-down, wind, orbital; both ways.
+"""Frames at the rotating Earth: inertial, Earth-fixed, geodetic, north-east-down, wind, orbital; in both directions.
 
 ECI    inertial, x to where longitude 0 is at angle 0, z to the north pole
 ECEF   Earth-fixed, x to longitude 0 on the equator, y to 90 degrees east, z to the north pole
-NED    north, east, down at a place: down is against the normal of the ellipsoid
-body   x ahead, y to the right, z down, as a vehicle's builder draws them
+NED    north, east, down at a location: down is opposite to the normal of the ellipsoid
+body   x ahead, y to the right, z down, as in the drawings of a vehicle
 wind   x along the velocity through the air, z in the body's plane of symmetry, downwards
 RIC    radial (outward), in-track (ahead, across the radius), cross-track (along the angular momentum)
 LVLH   x ahead, y against the angular momentum, z to the centre of the Earth
 
 A matrix `ned_from_ecef` takes components in ECEF to components in NED by `matrix_times`, and back by
-`transposed_times`; `from_matrix` of `mc_engine.physics.rotations` makes the quaternion of it.  Vectors are `Vector`s,
-SI and radians.  Precession, nutation and the pole's motion are left out in flights: since the epoch 2000 they are tens
-of kilometres at the ground, so start from axes of date, or use `ecef_from_gcrs` before a flight.
+`transposed_times`; `from_matrix` of `mc_engine.physics.rotations` makes a quaternion of it.  Vectors are `Vector`s, SI
+and radians.  Precession, nutation and polar motion are not modelled in flight.  Since the epoch 2000 they are tens of
+kilometres at the ground, so start from axes of date, or use `ecef_from_gcrs` before a flight.
 """
 
 from collections import namedtuple
@@ -50,8 +50,8 @@ _MJD = 2_400_000.5
 def earth_rotation_angle(days):
     """Earth rotation angle [rad], 0 to 2 pi, at `days` of UT1 since 2000 January 1, 12 h (Julian date 2451545.0).
 
-    IERS Conventions (2010), eq. (5.15), the whole turns taken off first.  From the celestial intermediate origin; see
-    `sidereal_angle` of `mc_engine.physics.sun_moon` for the equinox.
+    Measured from the celestial intermediate origin; for the equinox see `sidereal_angle` of
+    `mc_engine.physics.sun_moon`.  IERS Conventions (2010), eq. (5.15), with whole turns subtracted first.
     """
     turns = (days - floor(days)) + (0.7790572732640 + 0.00273781191135448 * days)
     return _TWO_PI * (turns - floor(turns))
@@ -59,35 +59,35 @@ def earth_rotation_angle(days):
 
 @physics
 def eci_to_ecef(v_eci, angle):
-    """Components in ECEF of a vector given in ECI, at the angle [rad] that the Earth has turned."""
+    """Components in ECEF of a vector given in ECI.  angle : by which the Earth has rotated [rad]."""
     s, c = sincos(angle)
     return Vector(c * v_eci.x + s * v_eci.y, c * v_eci.y - s * v_eci.x, v_eci.z)
 
 
 @physics
 def ecef_to_eci(v_ecef, angle):
-    """Components in ECI of a vector given in ECEF."""
+    """Components in ECI of a vector given in ECEF.  angle : as in `eci_to_ecef`."""
     s, c = sincos(angle)
     return Vector(c * v_ecef.x - s * v_ecef.y, c * v_ecef.y + s * v_ecef.x, v_ecef.z)
 
 
 @physics
 def velocity_eci_to_ecef(r_eci, v_eci, angle, rate=EARTH_RATE):
-    """Velocity relative to the turning Earth, in ECEF, of an inertial velocity: v - rate x r.  rate : [rad/s]"""
+    """Velocity relative to the rotating Earth, in ECEF, of an inertial velocity: v - rate x r.  rate : [rad/s]"""
     return eci_to_ecef(Vector(v_eci.x + rate * r_eci.y, v_eci.y - rate * r_eci.x, v_eci.z), angle)
 
 
 @physics
 def velocity_ecef_to_eci(r_ecef, v_ecef, angle, rate=EARTH_RATE):
-    """Inertial velocity, in ECI, of a velocity relative to the turning Earth: v + rate x r."""
+    """Inertial velocity, in ECI, of a velocity relative to the rotating Earth: v + rate x r.  rate : [rad/s]"""
     return ecef_to_eci(Vector(v_ecef.x - rate * r_ecef.y, v_ecef.y + rate * r_ecef.x, v_ecef.z), angle)
 
 
 def ecef_from_gcrs(mjd_utc: np.ndarray, ut1_less_utc: float = 0.0, xp: float = 0.0, yp: float = 0.0) -> np.ndarray:
     """Matrix [n, 3, 3] from the celestial (GCRS) to the terrestrial axes (ITRS) by IAU 2006/2000A, `erfa.c2t06a`.
 
-    mjd_utc : modified Julian dates;  ut1_less_utc : [s];  xp, yp : of the pole [rad].  NumPy: before a flight, whose
-    axes are then those of its start, turned by the Earth's rate.
+    mjd_utc : modified Julian dates [n];  ut1_less_utc : UT1 - UTC [s];  xp, yp : coordinates of the pole [rad].  NumPy:
+    use it before a flight, in which the axes of the start then rotate at the Earth's rate.
     """
     import erfa
 
@@ -101,7 +101,7 @@ def ecef_from_gcrs(mjd_utc: np.ndarray, ut1_less_utc: float = 0.0, xp: float = 0
 
 @physics
 def geodetic_to_ecef(place):
-    """ECEF position [m] of a Geodetic place."""
+    """ECEF position [m] of a Geodetic position."""
     s, c = sincos(place.latitude)
     n = WGS84_RADIUS / sqrt(1.0 - WGS84_ECCENTRICITY2 * s * s)
     level = (n + place.altitude) * c
@@ -111,10 +111,10 @@ def geodetic_to_ecef(place):
 
 @physics
 def ecef_to_geodetic(r_ecef):
-    """Geodetic place of an ECEF position [m].
+    """Geodetic latitude, longitude [rad] and altitude [m] of an ECEF position [m].
 
-    Three rounds of Bowring's step: latitude within 1e-15 rad and altitude within 5e-9 m or, farther out, the rounding
-    of the position; from 10 km below the ellipsoid to 3e8 m above it.  Not for the Earth's interior.
+    Three of Bowring's steps: latitude within 1e-15 rad and altitude within 5e-9 m or, farther out, the rounding of the
+    position, from 10 km below the ellipsoid to 3e8 m above it.  Not for the Earth's interior.
     B. R. Bowring, Survey Review 23 (1976) 323-327;  start and altitude: Bowring, Survey Review 28 (1985) 202-206.
     """
     x, y, z = r_ecef.x, r_ecef.y, r_ecef.z
@@ -141,7 +141,7 @@ def _direction(a, b):
 
 @physics
 def geodetic_rates(latitude, altitude, v_ned):
-    """Rates of a Geodetic place [rad/s, rad/s, m/s] at a velocity over the ground; the longitude's has a pole."""
+    """Rates of a Geodetic position [rad/s, rad/s, m/s] at a velocity over the ground [m/s]; singular at the poles."""
     s, c = sincos(latitude)
     w2 = 1.0 - WGS84_ECCENTRICITY2 * s * s
     n = WGS84_RADIUS / sqrt(w2)
@@ -162,27 +162,27 @@ def ned_from_ecef(latitude, longitude):
 
 @physics
 def ned_from_eci(latitude, longitude, angle):
-    """Matrix from ECI to NED, at the angle [rad] that the Earth has turned."""
+    """Matrix from ECI to NED.  angle : by which the Earth has rotated [rad]."""
     return ned_from_ecef(latitude, longitude + angle)
 
 
 @physics
 def ecef_to_ned(r_ecef, origin):
-    """Position [m] in the level frame of an origin, a Geodetic place: north, east, down from there."""
+    """Position [m] north, east and down from an origin, a Geodetic position, in its local level frame."""
     away = subtracted(r_ecef, geodetic_to_ecef(origin))
     return matrix_times(ned_from_ecef(origin.latitude, origin.longitude), away)
 
 
 @physics
 def ned_to_ecef(r_ned, origin):
-    """ECEF position [m] of a place given north, east and down from an origin, a Geodetic place."""
+    """ECEF position [m] of a position [m] given north, east and down from an origin, a Geodetic position."""
     away = transposed_times(ned_from_ecef(origin.latitude, origin.longitude), r_ned)
     return added(geodetic_to_ecef(origin), away)
 
 
 @physics
 def ned_to_course(v_ned):
-    """Speed, path angle and heading of a velocity in NED."""
+    """Speed [m/s], flight-path angle and heading [rad] of a velocity in NED."""
     level2 = v_ned.x * v_ned.x + v_ned.y * v_ned.y
     speed = sqrt(level2 + v_ned.z * v_ned.z)
     return Course(speed, atan2(-v_ned.z, sqrt(level2)), atan2(v_ned.y, v_ned.x))
@@ -201,7 +201,7 @@ def course_to_ned(course):
 
 @physics
 def body_to_flow(v_body):
-    """Speed, angle of attack and of sideslip of a velocity through the air, in body axes.
+    """Speed [m/s], angles of attack and sideslip [rad] of a velocity relative to the air, given in body axes.
 
     B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed. (2003), chapter 2: alpha = atan2(w, u),
     beta = asin(v / speed).
@@ -212,7 +212,7 @@ def body_to_flow(v_body):
 
 @physics
 def flow_to_body(flow):
-    """Velocity through the air, in body axes, of a speed and the two angles."""
+    """Velocity [m/s] relative to the air, in body axes, from speed, angle of attack and sideslip."""
     s, c = sincos(flow.beta)
     return Vector(flow.speed * c * cos(flow.alpha), flow.speed * s, flow.speed * c * sin(flow.alpha))
 
@@ -243,14 +243,14 @@ def lvlh_from_eci(r_eci, v_eci):
 
 @physics
 def ric_rate(r_eci, v_eci):
-    """Angular rate [rad/s] of RIC relative to ECI in RIC axes, for a motion without force across the orbit: h / r^2."""
+    """Angular rate [rad/s] of RIC relative to ECI in RIC axes, without force normal to the orbit: h / r^2."""
     h = cross(r_eci, v_eci)
     return Vector(0.0, 0.0, sqrt(dot(h, h)) / dot(r_eci, r_eci))
 
 
 @physics
 def eci_to_ric(r_eci, v_eci, r_other, v_other):
-    """Relative position and velocity [m, m/s] of another body, in ECI, as seen from the turning RIC of the first."""
+    """Position and velocity [m, m/s] of another body, given in ECI, relative to the rotating RIC of the first."""
     m, rate = ric_from_eci(r_eci, v_eci), ric_rate(r_eci, v_eci)
     position = matrix_times(m, subtracted(r_other, r_eci))
     velocity = matrix_times(m, subtracted(v_other, v_eci))
@@ -259,7 +259,7 @@ def eci_to_ric(r_eci, v_eci, r_other, v_other):
 
 @physics
 def ric_to_eci(r_eci, v_eci, relative):
-    """Position and velocity in ECI of another body that is given relative to the turning RIC of the first."""
+    """Position and velocity [m, m/s] in ECI of another body that is given relative to the rotating RIC of the first."""
     m, rate = ric_from_eci(r_eci, v_eci), ric_rate(r_eci, v_eci)
     velocity = added(relative.velocity, cross(rate, relative.position))
     return Relative(
@@ -269,6 +269,6 @@ def ric_to_eci(r_eci, v_eci, relative):
 
 @physics
 def acceleration_in_ecef(r_ecef, v_ecef, rate=EARTH_RATE):
-    """What the turning of the Earth adds to the acceleration relative to it: -2 rate x v - rate x (rate x r)."""
+    """Coriolis and centrifugal acceleration [m/s^2] in ECEF: -2 rate x v - rate x (rate x r)."""
     across = scaled(rate * rate, r_ecef)
     return Vector(2.0 * rate * v_ecef.y + across.x, across.y - 2.0 * rate * v_ecef.x, 0.0)

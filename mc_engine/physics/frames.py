@@ -1,9 +1,9 @@
-"""Places about a turning planet: altitude over its ellipsoid, local axes, relative and inertial velocity.
+"""Positions about a rotating planet: altitude over its ellipsoid, local axes, relative and inertial velocity.
 
 Planet-fixed axes: x to longitude 0, y to 90 degrees east, z to the north pole.  Latitudes are geocentric unless a
-name says geodetic; a sphere is an ellipsoid of eccentricity zero.  Headings count from north, clockwise.
+name says geodetic; a sphere is an ellipsoid of eccentricity zero.  Headings are measured clockwise from north.
 
-Compiled functions take and give plain numbers; those for whole chunks of cases are NumPy and say so.
+Compiled functions take and return plain numbers.  NumPy functions, for whole chunks of cases, are marked as such.
 """
 
 import numpy as np
@@ -23,9 +23,9 @@ def over_ellipsoid(r, inverse_r, sin2, polar_radius, e2):
     """(geodetic altitude [m], slope of the ellipsoid's radius by sin2 [m]) at distance r [m] from the centre.
 
     sin2 : squared sine of the latitude;  e2 : squared eccentricity, 0 for a sphere;  inverse_r : 1 / r.
-    With d = r - R(sin2) and t the angle between plumb line and radius, h = d - d t^2 R / (2 r): the way down the plumb
-    line to an osculating sphere, to second order in t.  On WGS 84 the error is below 0.1 mm up to 200 km of altitude
-    and below 0.1 m anywhere.
+    With d = r - R(sin2) and t the angle between plumb line and radius, h = d - d t^2 R / (2 r): the distance along the
+    plumb line to an osculating sphere, to second order in t.  On WGS 84 the error is below 0.1 mm up to 200 km of
+    altitude and below 0.1 m anywhere.
     """
     w = 1.0 / (1.0 - e2 * (1.0 - sin2))
     radius = polar_radius * sqrt(w)
@@ -37,13 +37,13 @@ def over_ellipsoid(r, inverse_r, sin2, polar_radius, e2):
 
 @physics
 def spherical(x, y, z):
-    """(latitude, longitude) [rad] of a place in planet-fixed axes [m]."""
+    """(latitude, longitude) [rad] of a position in planet-fixed axes [m]."""
     return atan2(z, sqrt(x * x + y * y)), atan2(y, x)
 
 
 @physics
 def geodetic_latitude(x, y, z, altitude, polar_radius, e2):
-    """Geodetic latitude [rad] of a place [m] whose geodetic altitude [m] is known.
+    """Geodetic latitude [rad] of a position [m] whose geodetic altitude [m] is known.
 
     tan(latitude) = z / (p (1 - e2 N / (N + h))) with p the distance from the axis and N the radius of curvature across
     the meridian, taken at the latitude of the plumb line's foot under the radius: the error is below 1e-8 rad.
@@ -56,7 +56,7 @@ def geodetic_latitude(x, y, z, altitude, polar_radius, e2):
 
 @physics
 def velocity_angles(x, y, z, vx, vy, vz):
-    """(flight-path angle, heading) [rad] of a velocity at a place, both in the same axes, z to the north pole.
+    """(flight-path angle, heading) [rad] of a velocity at a position, both in the same axes, z to the north pole.
 
     Exactly on the axis, x = y = 0, both angles are 0, whatever the velocity.
     """
@@ -82,7 +82,7 @@ def velocity_components(speed: np.ndarray, path_angle: np.ndarray, heading: np.n
 
 
 def carried_along(radius: np.ndarray, latitude: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """North, east and up components [3, n] of the velocity of the turning frame: inertial less relative.  NumPy."""
+    """North, east and up components [3, n] of the velocity of the rotating frame: inertial less relative.  NumPy."""
     zero = np.zeros_like(radius)
     return np.array([zero, rate * radius * np.cos(latitude), zero])
 
@@ -90,7 +90,7 @@ def carried_along(radius: np.ndarray, latitude: np.ndarray, rate: np.ndarray) ->
 def radius_at_altitude(
     altitude: np.ndarray, latitude: np.ndarray, polar_radius: np.ndarray, e2: np.ndarray
 ) -> np.ndarray:
-    """Distance [m] from the centre of the place at a geodetic altitude [m] over a geocentric latitude.  NumPy."""
+    """Distance [m] from the centre of a position at a geodetic altitude [m] and a geocentric latitude [rad].  NumPy."""
     sin2 = np.sin(latitude) ** 2
     r = polar_radius + altitude
     for _ in range(6):  # altitude grows by almost a metre for a metre of radius: each step gains five digits
@@ -102,20 +102,20 @@ def radius_at_altitude(
 def full_turn(angle):
     """The angle [rad] from 0 to 2 pi, both ends included: -1e-20 becomes 2 pi.
 
-    Beyond the ends by the rounding of the given angle at most: -2e-12 after 2000 turns.
+    It may exceed the ends by the rounding of the given angle, such as -2e-12 after 2000 turns.
     """
     return angle - TURN * floor(angle * (1.0 / TURN))
 
 
 @physics
 def half_turn(angle):
-    """The angle [rad] from -pi to pi; beyond the ends by the rounding of the given angle at most, as `full_turn`."""
+    """The angle [rad] from -pi to pi; it may exceed the ends by the rounding of the given angle, as in `full_turn`."""
     return angle - TURN * rint(angle * (1.0 / TURN))
 
 
 @physics
 def turned(x, y, cosine, sine):
-    """(x, y) of the same vector in axes that are turned about z by an angle, given by its cosine and sine."""
+    """(x, y) of the same vector in axes rotated about z by an angle, given by its cosine and sine."""
     return cosine * x + sine * y, cosine * y - sine * x
 
 

@@ -1,8 +1,8 @@
-"""Acceleration of a body of arbitrary shape: spherical harmonics to any degree and order, in body-fixed axes.
+"""Gravity of a body of arbitrary shape: spherical harmonics to any degree and order, in body-fixed axes.
 
 The coefficients of the Earth are those of EGM2008 to degree 8: at the geostationary radius degrees 5 to 8 together
-are up to 3e-10 m/s^2, and degree 8 alone is below 1e-12 m/s^2.  In compiled flights degree and order are settings;
-the coefficients stand in the model's tables, so one kernel serves all.
+are up to 3e-10 m/s^2, and degree 8 alone is below 1e-12 m/s^2.  In compiled flights degree and order are settings.
+The coefficients are in the model's tables, so one kernel serves all degrees and orders.
 """
 
 from math import factorial
@@ -70,9 +70,9 @@ def unnormalised(n: int, m: int) -> float:
 
 
 def harmonics_table(degree: int, order: int) -> np.ndarray:
-    """What `harmonics` reads: float64[n_rows, COLUMNS], column after column of the functions V and W.
+    """The table that `harmonics` reads: float64[n_rows, COLUMNS], column after column of the functions V and W.
 
-    The row of degree i and order j: the four products of V and W that join the acceleration along x and y, the two
+    The row of degree i and order j has the four factors of V and W in the acceleration along x and y, the two factors
     along z, and both factors of the recursion.  Terms of orders above `order` are left out.  Raises ModelError for a
     degree above `LARGEST_DEGREE`.
     """
@@ -114,9 +114,9 @@ def _harmonics_row(c: np.ndarray, s: np.ndarray, i: int, j: int) -> list[float]:
 def harmonics(x, y, z, mu, radius, degree, order, tables, first):
     """Acceleration [m/s^2] at (x, y, z) [m] of the harmonics from degree 2 on, to be added to `point_mass`.
 
-    Body-fixed axes.  degree, order : whole numbers as floats, 2 or more and 0 or more; tables, first : where the rows
-    of `harmonics_table(degree, order)` begin.  The recursion of Cunningham, column by column, so that nothing is kept:
-    Montenbruck, Gill, Satellite Orbits, eqs (3.29)-(3.33).
+    Body-fixed axes.  degree, order : whole numbers as floats, 2 or more and 0 or more; tables, first : the tables, and
+    the index at which the rows of `harmonics_table(degree, order)` begin.  Cunningham's recursion, column by column, so
+    that no array is needed: Montenbruck, Gill, Satellite Orbits, eqs (3.29)-(3.33).
     """
     r2 = x * x + y * y + z * z
     inverse2 = 1.0 / r2

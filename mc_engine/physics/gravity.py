@@ -1,7 +1,7 @@
-"""Gravitational acceleration of an oblate Earth, in inertial axes with z along the rotation axis; weight over ground.
+"""Gravitational acceleration of an oblate Earth, in inertial axes with z along the rotation axis; gravity at rest.
 
 Powers of the distance are made of 1/r**2 and r: a division takes as long as twenty products, and the compiler
-then divides once for all functions that are called with the same place.
+then divides once for all functions that are called with the same position.
 """
 
 from mc_engine.lanes import fma, physics, sqrt
@@ -32,7 +32,7 @@ def j2_perturbation(x, y, z, mu):
 
 @physics
 def oblate(x, y, z, mu):
-    """Acceleration [m/s^2] by a point and the second zonal harmonic together: a few products less than their sum.
+    """Acceleration [m/s^2] by a point mass and J2: as `point_mass` plus `j2_perturbation`, with fewer operations.
 
     Curtis, Orbital Mechanics for Engineering Students, 3rd ed., eq. (12.30) added to the point's.
     """
@@ -48,7 +48,7 @@ def oblate(x, y, z, mu):
 
 @physics
 def normal_gravity(sine2, h):
-    """Gravity [m/s^2] at rest on the turning Earth, h [m] above the ellipsoid of WGS 84.  sine2 : sin^2 of latitude.
+    """Gravity [m/s^2] at rest on the rotating Earth, h [m] above the WGS 84 ellipsoid.  sine2 : sin^2 of the latitude.
 
     NIMA TR8350.2, 3rd ed. (2000), eqs (4-1) and (4-3): good to 20 km.
     """

@@ -1,7 +1,7 @@
-"""Convective heating at the stagnation point of a blunt nose.  W/m^2.
+"""Convective heat flux at the stagnation point of a blunt nose, in W/m^2.
 
 Cold wall, continuum flow.  Above about 11 km/s at Earth radiation is no longer small and must be added.
-The `coefficient` of each correlation holds everything that stays the same during a flight.
+The `coefficient` of each correlation contains everything that is constant during a flight.
 """
 
 from mc_engine.lanes import physics, pow, sqrt
@@ -13,13 +13,13 @@ DKR_EXPONENT = 3.15
 
 @physics
 def sutton_graves(density, speed, coefficient):
-    """q = k sqrt(rho / R_n) V^3 with coefficient = k / sqrt(R_n); NASA TR R-376 (1971)."""
+    """Heat flux [W/m^2]: q = k sqrt(rho / R_n) V^3 with coefficient = k / sqrt(R_n); NASA TR R-376 (1971)."""
     return coefficient * sqrt(density) * (speed * speed * speed)
 
 
 @physics
 def detra_kemp_riddell(density, speed, coefficient):
-    """q = coefficient sqrt(rho) V^3.15; Detra, Kemp, Riddell, Jet Propulsion 27 (1957) 1256-1257."""
+    """Heat flux [W/m^2]: coefficient sqrt(rho) V^3.15; Detra, Kemp, Riddell, Jet Propulsion 27 (1957) 1256-1257."""
     return coefficient * sqrt(density) * pow(speed, DKR_EXPONENT)
 
 

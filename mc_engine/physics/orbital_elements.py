@@ -1,7 +1,7 @@
 """Elements of closed orbits.  SI, radians.
 
-Equinoctial elements, for orbits that may be circular and may lie in the equator but not near 180 degrees of
-inclination; and, in NumPy for whole chunks of cases, states from classical elements and Kepler's equation.
+Equinoctial elements are regular for circular and equatorial orbits, but not near 180 degrees of inclination.  States
+from classical elements, and Kepler's equation, are in NumPy, for whole chunks of cases.
 """
 
 from collections import namedtuple
@@ -17,7 +17,7 @@ Equinoctial = namedtuple("Equinoctial", "a k h q p mean true")
 
 @physics
 def equinoctial(x, y, z, vx, vy, vz, mu):
-    """Osculating elements at an inertial place [m] and velocity [m/s].
+    """Osculating equinoctial elements at an inertial position [m] and velocity [m/s]; a [m], angles [rad].
 
     R. A. Broucke, P. J. Cefola, Celestial Mechanics 5 (1972) 303-310; D. A. Danielson et al., Semianalytic Satellite
     Theory, NPS-MA-95-002 (1995), section 2.1.4.
@@ -47,7 +47,7 @@ def equinoctial(x, y, z, vx, vy, vz, mu):
 
 
 def state_of_elements(a, e, inclination, node, pericentre, anomaly, mu: float) -> np.ndarray:
-    """Place [m] and velocity [m/s], float64[6, n], of orbits of semi-major axis a [m] at a true anomaly.
+    """Position [m] and velocity [m/s], float64[6, n], from classical elements: a [m], true anomaly and angles [rad].
 
     Montenbruck, Gill, Satellite Orbits, eqs (2.43)-(2.51).
     """
@@ -62,13 +62,13 @@ def state_of_elements(a, e, inclination, node, pericentre, anomaly, mu: float) -
 
 
 def mean_anomaly(anomaly, e):
-    """Mean anomaly of a true one on ellipses of eccentricity e: Kepler's equation, M = E - e sin E."""
+    """Mean anomaly [rad] of a true anomaly [rad], for eccentricity e < 1: Kepler's equation, M = E - e sin E."""
     eccentric = 2.0 * np.arctan2(np.sqrt(1.0 - e) * np.sin(0.5 * anomaly), np.sqrt(1.0 + e) * np.cos(0.5 * anomaly))
     return eccentric - e * np.sin(eccentric)
 
 
 def true_anomaly(mean, e):
-    """True anomaly, within half a turn, of a mean one; Kepler's equation by 12 of Newton's steps.  For e up to 0.95."""
+    """True anomaly [rad], -pi to pi, of a mean anomaly [rad], by 12 Newton steps.  For eccentricities up to 0.95."""
     mean = np.mod(np.asarray(mean) + np.pi, 2.0 * np.pi) - np.pi
     eccentric = mean + e * np.sin(mean)
     for _ in range(12):

@@ -5,8 +5,8 @@
 The output goes on, to the thruster's level, when y reaches `on` and off again when y falls to `off`.
 The standard form has one gain, input_gain = feedback_gain = K.
 
-`lag_rate` is for a model whose trigger is an event of the engine.  `sampled_pulses` needs none: under a command that
-is held from sample to sample the lag is an exponential, and its switching times are known.
+`lag_rate` is for a model whose trigger is an event of the engine.  `sampled_pulses` needs no events: if the command is
+held from sample to sample, the lag is an exponential, and its switching times are known.
 
 M. J. Sidi, Spacecraft Dynamics and Control (1997), section 9.3.
 """
@@ -134,9 +134,9 @@ def sampled_pulses(x, y, z, command_x, command_y, command_z, m, period):
     Each command is held; each modulator fires in both directions.  mean : of the output over the sample, -1 to 1.
     m : gain, of the standard form, on command and output; level, on, off, time_constant [s];
         decay = exp(-period / time_constant).
-    Switching times are exact: the lag goes from y to its drive d as d + (y - d) exp(-t / time_constant).  A sample may
-    hold any number of switches.  Three axes at once, as eight cases seldom switch all together: a processor that
-    waits for one division can work at the others.
+    Switching times are exact: the lag moves from y to its drive d as d + (y - d) exp(-t / time_constant).  A sample may
+    contain any number of switches.  Three axes are computed at once, because a processor that waits for the division of
+    one axis can compute the others.
     """
     a, b, c = _begun(x, command_x, m, period), _begun(y, command_y, m, period), _begun(z, command_z, m, period)
     for _ in range(SWITCHES_FOLLOWED):

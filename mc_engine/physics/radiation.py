@@ -1,7 +1,7 @@
 """Pressure of sunlight on a satellite that is the same from all sides, with the Earth's shadow.
 
-The shadow is that of a round Earth without air, umbra and penumbra; the Moon's is left out, and so is light that the
-Earth sends back.  A craft with large panels that do not face the Sun wants a model of its panels instead.
+The Earth is a sphere without atmosphere; its shadow has an umbra and a penumbra.  The shadow of the Moon and the light
+reflected by the Earth are not modelled.  A spacecraft with large panels that do not face the Sun needs a panel model.
 """
 
 from mc_engine.lanes import acos, asin, maximum, minimum, physics, sqrt, where
@@ -16,7 +16,7 @@ PI = 3.141592653589793
 def discs(x, y, z, sx, sy, sz):
     """Angles [rad] seen from (x, y, z) [m]: radius of the Sun's disc, radius of the Earth's, distance of their centres.
 
-    s : place of the Sun [m], both from the Earth's centre
+    s : position of the Sun [m], both from the Earth's centre
     """
     dx, dy, dz = sx - x, sy - y, sz - z
     r, d = sqrt(x * x + y * y + z * z), sqrt(dx * dx + dy * dy + dz * dz)
@@ -26,11 +26,11 @@ def discs(x, y, z, sx, sy, sz):
 
 @physics
 def sunlit(x, y, z, sx, sy, sz):
-    """Share of the Sun's disc seen from (x, y, z) [m], 0 to 1; s: place of the Sun [m], both from the Earth's centre.
+    """Fraction, 0 to 1, of the Sun's disc visible from (x, y, z) [m]; s: the Sun [m], both from the Earth's centre.
 
-    Within a million kilometres of the Earth, whose disc is then the larger.  The share has corners where penumbra and
-    umbra begin and end: flights that must be exact end their steps there, at the zeros of c - b - a and c - b + a of
-    `discs`.  Montenbruck, Gill, Satellite Orbits, section 3.4.2, eqs (3.85)-(3.94).
+    Valid within a million kilometres of the Earth, where its disc is the larger one.  The slope of the fraction jumps
+    where penumbra and umbra begin and end: for full accuracy let steps end there, by events at the zeros of c - b - a
+    and c - b + a of `discs`.  Montenbruck, Gill, Satellite Orbits, section 3.4.2, eqs (3.85)-(3.94).
     """
     a, b, c = discs(x, y, z, sx, sy, sz)
     partly = (c < a + b) & (c > b - a)
@@ -45,7 +45,7 @@ def sunlit(x, y, z, sx, sy, sz):
 
 @physics
 def solar_pressure(x, y, z, sx, sy, sz, area_to_mass, reflectivity):
-    """Acceleration [m/s^2] at (x, y, z) [m] by light from s [m]: P C_R (A/m) (AU/d)^2, away from the Sun.
+    """Acceleration [m/s^2] at (x, y, z) [m] by light from the Sun at s [m]: P C_R (A/m) (AU/d)^2, away from it.
 
     area_to_mass : m^2/kg;  reflectivity : C_R, 1 for a black body, 2 for a mirror that faces the Sun
     """

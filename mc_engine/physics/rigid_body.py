@@ -1,9 +1,9 @@
-"""A rigid body with six degrees of freedom, over flat ground or about the turning, oblate Earth; rockets.
+"""A rigid body with six degrees of freedom, over flat ground or about the rotating, oblate Earth; rockets.
 
-A `Motion` is position, velocity, attitude and angular rate, and so is its derivative; the fields of a model's state are
-these numbers one by one.  Forces and moments are given in body axes, moments about the centre of mass.  The attitude is
-a quaternion from the frame of the position to the body (see `mc_engine.physics.rotations`).  Not for flexible bodies
-and sloshing fuel.  SI.
+A `Motion` is position, velocity, attitude and angular rate; its derivative is a `Motion` too.  The state of a model has
+these numbers as single fields.  Forces and moments are given in body axes, moments about the centre of mass.  The
+attitude is a quaternion from the frame of the position to the body (see `mc_engine.physics.rotations`).  Not for
+flexible bodies and sloshing fuel.  SI.
 
 P. H. Zipfel, Modeling and Simulation of Aerospace Vehicle Dynamics, 2nd ed. (2007), chapters 4 and 6;
 W. T. Thomson, Introduction to Space Dynamics (1961), chapters 5 and 8 (variable mass).
@@ -48,7 +48,7 @@ def angular_momentum(inertia, rate):
 
 @physics
 def rate_of(inertia, momentum):
-    """The rate [rad/s] that goes with an angular momentum: the inverse of `angular_momentum`, by cofactors."""
+    """The angular rate [rad/s] for an angular momentum: the inverse of `angular_momentum`, by cofactors."""
     i, h = inertia, momentum
     cxx, cyy, czz = i.yy * i.zz - i.yz * i.yz, i.xx * i.zz - i.xz * i.xz, i.xx * i.yy - i.xy * i.xy
     cxy, cxz, cyz = i.xy * i.zz + i.xz * i.yz, i.xy * i.yz + i.xz * i.yy, i.xx * i.yz + i.xy * i.xz
@@ -62,7 +62,7 @@ def rate_of(inertia, momentum):
 
 @physics
 def inertia_about(inertia, mass, arm):
-    """Inertia about a point at `arm` [m] from the centre of mass, by the parallel axes; with -mass the way back."""
+    """Inertia about a point at `arm` [m] from the centre of mass, by the parallel-axis theorem; -mass reverses it."""
     i, a = inertia, arm
     return Inertia(
         i.xx + mass * (a.y * a.y + a.z * a.z),
@@ -76,7 +76,7 @@ def inertia_about(inertia, mass, arm):
 
 @physics
 def inertia_between(empty, full, share):
-    """Inertia at a share of the fuel, 0 to 1, linear between two; with share' [1/s] and `inertia_rate` for its rate."""
+    """Inertia [kg m^2] at a fraction of the fuel, 0 to 1, linear between empty and full; `inertia_rate` is its rate."""
     e, f = empty, full
     return Inertia(
         e.xx + share * (f.xx - e.xx),
@@ -90,7 +90,7 @@ def inertia_between(empty, full, share):
 
 @physics
 def inertia_rate(empty, full, share_rate):
-    """Rate [kg m^2/s] of `inertia_between` for a rate of the share [1/s], negative while fuel burns."""
+    """Rate [kg m^2/s] of `inertia_between` for a rate of the fraction [1/s], negative while fuel burns."""
     e, f, k = empty, full, share_rate
     return Inertia(
         k * (f.xx - e.xx), k * (f.yy - e.yy), k * (f.zz - e.zz),
@@ -106,9 +106,9 @@ def angular_acceleration(inertia, rate, moment):
 
 @physics
 def angular_acceleration_changing(inertia, change, rate, moment):
-    """The same while the inertia changes [kg m^2/s]: I w' = M - I' w - w x (I w).
+    """Angular acceleration [rad/s^2] while the inertia changes at a rate [kg m^2/s]: I w' = M - I' w - w x (I w).
 
-    What the gas takes along is a moment of its own: `jet_damping`.  Thomson, chapter 8.
+    The angular momentum carried away by the gas is a separate moment: `jet_damping`.  Thomson, chapter 8.
     """
     return angular_acceleration(inertia, rate, subtracted(moment, angular_momentum(change, rate)))
 
@@ -124,34 +124,34 @@ def moment_of(force, arm):
 
 @physics
 def thrust_force(thrust, pitch, yaw):
-    """Force [N] of an engine that points along x but for two angles [rad], towards -z and towards y."""
+    """Force [N] of an engine along x, deflected by two angles [rad], pitch towards -z and yaw towards y."""
     level = thrust * cos(pitch)
     return Vector(level * cos(yaw), level * sin(yaw), -thrust * sin(pitch))
 
 
 @physics
 def jet_damping(flow, arm, rate):
-    """Moment [N m] of gas that leaves at `arm` [m] with a mass flow [kg/s] above 0: -flow arm x (rate x arm)."""
+    """Damping moment [N m] of gas leaving at `arm` [m] with a mass flow [kg/s] above 0: -flow arm x (rate x arm)."""
     return scaled(-flow, cross(arm, cross(rate, arm)))
 
 
 @physics
 def aerodynamic_force(pressure, area, alpha, beta, drag, side, lift):
-    """Force [N] by coefficients in wind axes.  pressure : dynamic [Pa];  area : of reference [m^2]."""
+    """Force [N] in body axes by coefficients in wind axes.  pressure : dynamic [Pa];  area : reference area [m^2]."""
     size = pressure * area
     return transposed_times(wind_from_body(alpha, beta), Vector(-size * drag, size * side, -size * lift))
 
 
 @physics
 def aerodynamic_moment(pressure, area, length, roll, pitch, yaw):
-    """Moment [N m] by coefficients about the body axes.  length : of reference [m]."""
+    """Moment [N m] by coefficients about the body axes.  pressure, area : as in `aerodynamic_force`;  length : [m]."""
     size = pressure * area * length
     return Vector(size * roll, size * pitch, size * yaw)
 
 
 @physics
 def gravity_gradient(inertia, r_body, mu=MU_EARTH):
-    """Moment [N m] of gravity: 3 mu / r^5 r x (I r).  r_body : from the Earth's centre [m], in body axes.
+    """Gravity-gradient moment [N m]: 3 mu / r^5 r x (I r).  r_body : from the Earth's centre [m], in body axes.
 
     P. C. Hughes, Spacecraft Attitude Dynamics (1986), chapter 8.
     """
@@ -162,7 +162,7 @@ def gravity_gradient(inertia, r_body, mu=MU_EARTH):
 
 @physics
 def air_velocity(r_eci, v_eci, body_from_eci, wind_eci, rate=EARTH_RATE):
-    """Velocity [m/s] through the air that turns with the Earth, in body axes.  wind_eci : over the ground, in ECI."""
+    """Velocity [m/s] relative to the air rotating with the Earth, in body axes.  wind_eci : over the ground, in ECI."""
     ground = Vector(v_eci.x + rate * r_eci.y, v_eci.y - rate * r_eci.x, v_eci.z)
     return transformed(body_from_eci, subtracted(ground, wind_eci))
 
@@ -184,9 +184,9 @@ def flat_derivative(motion, mass, inertia, force, moment, gravity):
 
 @physics
 def orbital_derivative(motion, mass, inertia, force, moment):
-    """Derivative of a Motion in ECI under the gravity of the oblate Earth, whose moment is not in it.
+    """Derivative of a Motion in ECI under the gravity of the oblate Earth, without the gravity-gradient moment.
 
-    The turning of the Earth is in what acts: `air_velocity`, and places by `eci_to_ecef` and `ecef_to_geodetic`.
+    The Earth's rotation enters only through force and moment: `air_velocity`, `eci_to_ecef`, `ecef_to_geodetic`.
     """
     r = motion.position
     push = transformed_back(motion.attitude, scaled(1.0 / mass, force))
@@ -223,12 +223,12 @@ def solid_propellant(
 ) -> Callable[..., Propellant]:
     """propellant(t) -> `Propellant` of a motor with hollow cylinders in a row, which burn inside and at both ends.
 
-    thrust : of the time [N];  burn : time at which nothing is left [s];  number, density [kg/m^3] of the cylinders
-    outer, inner, length, gap : radii and length of a cylinder at first, and what is between two of them [m]
+    thrust : curve over time [N];  burn : burnout time [s];  number, density [kg/m^3] : of the cylinders
+    outer, inner, length, gap : initial radii and length of a cylinder, and the gap between two of them [m]
     ModelError unless 0 <= inner < outer, and number, density, length and burn are above zero.
 
-    The flow goes by the thrust, at a constant exhaust speed; the motor is computed every millisecond.  Derived here
-    from m = n rho pi (R^2 - r^2) L with L' = -2 r'.
+    The mass flow is proportional to the thrust (constant exhaust speed); the motor is computed every millisecond.
+    Derived here from m = n rho pi (R^2 - r^2) L with L' = -2 r'.
     """
     if not (0.0 <= inner < outer and all(size > 0.0 for size in (number, density, length, burn))):
         raise ModelError(
@@ -271,8 +271,8 @@ def rocket_accelerations(rocket, fuel, rate, force, moment, weight):
     fuel : `Propellant`;  rate : of the body [rad/s];  force [N] : thrust and air, with its moment [N m] about the dry
     centre of mass;  weight : gravity [m/s^2]
 
-    The balance of momentum and of its moment of what is inside the rocket, with propellant on the axis; the second
-    derivative of the place of the centre of mass is left out, as by G. H. Ceotto et al., J. Aerosp. Eng. 34(6), 2021.
+    Balance of momentum and angular momentum of the rocket's contents, with propellant on the axis; the second
+    derivative of the centre of mass is left out, as by G. H. Ceotto et al., J. Aerosp. Eng. 34(6), 2021.
     RocketPy 1.13 differs in other terms: see "Replace a simulator by a compiled model, and prove it".
     """
     w, m = rate, rocket.mass + fuel.mass

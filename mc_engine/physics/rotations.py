@@ -1,9 +1,9 @@
 """Attitude as quaternions, direction cosines, Euler angles and rotation vectors, with one convention.
 
-A quaternion `b_from_a` (scalar first, Hamilton's product, unit length) says how frame b is turned from frame a, and
-`transformed(b_from_a, v_a)` are the components in b of a vector given in a; its matrix `to_matrix(b_from_a)` does the
-same.  It is the convention of `mc_engine.physics.attitude`.  Frames are chained by `chained(b_from_a, c_from_b)`.
-q and -q are the same attitude.  `rotated` is the other meaning of a quaternion: it turns the vector and keeps the axes.
+A quaternion `b_from_a` (scalar first, Hamilton's product, unit length) is the rotation of frame b from frame a.
+`transformed(b_from_a, v_a)` gives the components in b of a vector given in a, as does its matrix `to_matrix(b_from_a)`.
+`mc_engine.physics.attitude` has the same convention.  `chained(b_from_a, c_from_b)` is c_from_a.  q and -q are the same
+attitude.  `rotated` uses a quaternion in the other sense: it rotates the vector and keeps the axes.
 
 M. J. Sidi, Spacecraft Dynamics and Control (1997), appendix A.4;  M. D. Shuster, A survey of attitude
 representations, J. Astronautical Sciences 41 (1993) 439-517.
@@ -46,14 +46,14 @@ def inverse(b_from_a):
 
 @physics
 def normalized(q):
-    """The quaternion with length 1; not a number for zero."""
+    """The quaternion scaled to length 1; NaN for a zero quaternion."""
     u = 1.0 / sqrt(q.q0 * q.q0 + q.q1 * q.q1 + q.q2 * q.q2 + q.q3 * q.q3)
     return Quaternion(u * q.q0, u * q.q1, u * q.q2, u * q.q3)
 
 
 @physics
 def rotated(q, v):
-    """The vector v turned by q, in unchanged axes: q (0, v) q*, as v + 2 q0 (qv x v) + 2 qv x (qv x v)."""
+    """The vector v rotated by q, in unchanged axes: q (0, v) q*, as v + 2 q0 (qv x v) + 2 qv x (qv x v)."""
     axis = Vector(q.q1, q.q2, q.q3)
     t = cross(axis, v)
     u = cross(axis, t)
@@ -114,7 +114,7 @@ def _better(best, q, other, r):
 
 @physics
 def from_rotation_vector(v):
-    """b_from_a of a turn about v by its length [rad], seen from a or from b alike."""
+    """b_from_a of a rotation about v by its length [rad]; v has the same components in a and b."""
     angle2 = dot(v, v)
     small = angle2 < 1e-8
     angle = sqrt(where(small, 1.0, angle2))
@@ -125,7 +125,7 @@ def from_rotation_vector(v):
 
 @physics
 def to_rotation_vector(b_from_a):
-    """The rotation vector [rad] of the shorter way from a to b, of length 0 to pi."""
+    """The rotation vector [rad] of the shorter rotation from a to b, of length 0 to pi."""
     q0, q1, q2, q3 = b_from_a
     sign = where(q0 < 0.0, -1.0, 1.0)
     size = sqrt(q1 * q1 + q2 * q2 + q3 * q3)
@@ -142,11 +142,11 @@ def from_small_angles(angles):
 
 @physics
 def from_two_vectors(a, b):
-    """The shortest rotation q with rotated(q, a) along b.  For opposite vectors, half a turn about some axis across.
+    """The shortest rotation q with rotated(q, a) along b; for opposite vectors, half a turn about a perpendicular axis.
 
-    a, b : of lengths from 1e-150 to 1e154, not zero.  Frames: the axes of the second frame are those of the first,
-    turned by q.  The direction is right to 1e-15, next to opposite vectors, too: there the sum of both directions h has
-    no rounding, and cos(angle / 2) and the axis come from it as |h|^2 / 2 and a x h.
+    a, b : of lengths from 1e-150 to 1e154, not zero.  As a frame rotation, the second frame is the first one rotated by
+    q.  The direction is accurate to 1e-15, also for nearly opposite vectors: there the sum of both directions h has no
+    rounding, and cos(angle / 2) and the axis are computed from it as |h|^2 / 2 and a x h.
     """
     a, b = unit(a), unit(b)
     h = added(a, b)
@@ -172,7 +172,7 @@ def derivative(b_from_a, rate_b):
 
 @physics
 def derivative_held(b_from_a, rate_b, gain):
-    """The same with the pull gain (1 - |q|^2) q / 2 [gain: 1/s] towards unit length, which integration loses slowly."""
+    """The `derivative` plus gain (1 - |q|^2) q / 2 [gain: 1/s], which holds |q| at 1 against integration errors."""
     q, d = b_from_a, derivative(b_from_a, rate_b)
     k = 0.5 * gain * (1.0 - (q.q0 * q.q0 + q.q1 * q.q1 + q.q2 * q.q2 + q.q3 * q.q3))
     return Quaternion(d.q0 + k * q.q0, d.q1 + k * q.q1, d.q2 + k * q.q2, d.q3 + k * q.q3)
@@ -185,12 +185,12 @@ def _wrapped(angle):
 
 
 def euler_sequence(axes):
-    """(from_angles, to_angles) for successive turns about body axes, such as "321" for yaw, pitch, roll.
+    """(from_angles, to_angles) for successive rotations about body axes, such as "321" for yaw, pitch, roll.
 
-    axes : three digits of 1, 2, 3, no two neighbours alike (twelve sequences); ModelError for others.
+    axes : three digits of 1, 2, 3, adjacent ones different (twelve sequences); ModelError for others.
     from_angles(first, second, third) -> b_from_a, angles [rad];  to_angles(b_from_a) -> Vector of the three, first and
-    third from -pi to pi, second from -pi/2 to pi/2 or, where the first axis returns, from 0 to pi.  Where the second is
-    at an end of its range only the sum or difference of the other two is determined, and one such pair is given.
+    third from -pi to pi, second from -pi/2 to pi/2 or, if first and third axis are the same, from 0 to pi.  If the
+    second is at an end of its range, only the sum or difference of the others is determined; one such pair is returned.
 
     E. Bernardes and S. Viollet, PLoS ONE 17(11), e0276302 (2022): one formula for all sequences.
     """

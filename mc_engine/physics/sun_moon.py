@@ -1,11 +1,11 @@
-"""Sun and Moon as seen from the Earth's centre, and what they do to a satellite's motion.
+"""Sun and Moon relative to the Earth's centre, and their gravity on a satellite.
 
-Positions come from pyerfa and stand in a table that compiled flights interpolate: the Sun by the Earth's motion of
+Positions come from pyerfa, in a table that compiled flights interpolate: the Sun by the Earth's motion of
 `erfa.epv00` (better than 0.1"), the Moon by `erfa.moon98` (3" r.m.s. and up to 13", J. Meeus, Astronomical Algorithms,
 2nd ed., chapter 47, after ELP 2000-82).  Interpolation adds less than 0.02" to the Moon.
 
-Axes: mean equator and equinox of date, z to the pole.  Within 30 days they turn by 4", which flights leave out; UT1 is
-taken as UTC, within 0.9 s or 14".
+Axes: mean equator and equinox of date, z to the pole.  They rotate by 4" in 30 days, which flights neglect.  UT1 is
+replaced by UTC, which differs by up to 0.9 s or 14".
 """
 
 import erfa
@@ -36,9 +36,9 @@ def sidereal_angle(mjd_utc: np.ndarray) -> np.ndarray:
 
 
 def sun_and_moon(mjd_tt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(place, velocity) [m, m/s] of Sun and Moon, float64[n, 2, 3] each, mean equator and equinox of their own date.
+    """(position, velocity) [m, m/s] of Sun and Moon, float64[n, 2, 3] each, mean equator and equinox of their own date.
 
-    Geometric: the light's time of flight, 20" of the Sun's longitude, changes neither gravity nor pressure noticeably.
+    Geometric: light time, 20" of the Sun's longitude, is neglected for gravity and radiation pressure.
     """
     tt = np.atleast_1d(np.asarray(mjd_tt, dtype=np.float64))
     earth = erfa.epv00(_MJD, tt)[0]
@@ -52,7 +52,7 @@ def sun_and_moon(mjd_tt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def node_before(mjd_utc: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(number of the last node of the grid before a UTC date, time [s] from that node to it).
 
-    The grid is the same for all dates, so a case reads the same numbers whatever others are flown with it.
+    The grid is the same for all dates, so a case reads the same numbers, whichever other cases are flown with it.
     """
     since = terrestrial_time(mjd_utc) / SPACING
     number = np.floor(since)
@@ -60,7 +60,7 @@ def node_before(mjd_utc: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def ephemeris_table(first: int, last: int) -> np.ndarray:
-    """What `ephemeris` reads: float64[last - first + 1, COLUMNS], a row for every node of the grid."""
+    """The table that `ephemeris` reads: float64[last - first + 1, COLUMNS], a row for every node of the grid."""
     place, velocity = sun_and_moon(SPACING * np.arange(first, last + 1))
     return np.concatenate([place, SPACING * _DAY * velocity], axis=2).reshape(-1, COLUMNS)
 
@@ -76,7 +76,7 @@ def _between(tables, at, u):
 
 @physics
 def ephemeris(t, tables, first):
-    """Places of the Sun and the Moon [m], six numbers, at t [s] after the node whose row begins at `first`."""
+    """Positions of Sun and Moon [m], six numbers, at t [s] after the node whose row begins at index `first`."""
     since = t * (1.0 / (SPACING * _DAY))
     node = floor(since)
     u, at = since - node, first + COLUMNS * node
@@ -88,9 +88,9 @@ def ephemeris(t, tables, first):
 
 @physics
 def third_body(x, y, z, bx, by, bz, mu):
-    """Acceleration [m/s^2] at (x, y, z) by a body at b [m] of parameter mu, less that of the Earth's centre.
+    """Acceleration [m/s^2] at (x, y, z) [m] by a body at b [m] with mu [m^3/s^2], less that of the Earth's centre.
 
-    With q = r.(r - 2 b)/b^2 the difference of the two pulls loses no digits: R. H. Battin, An Introduction to the
+    With q = r.(r - 2 b)/b^2 the difference of the two terms loses no digits: R. H. Battin, An Introduction to the
     Mathematics and Methods of Astrodynamics, revised ed. (1999), eqs (8.60)-(8.62).
     """
     b2 = bx * bx + by * by + bz * bz

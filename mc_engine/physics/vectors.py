@@ -34,7 +34,7 @@ def norm(a):
 
 @physics
 def unit(a):
-    """a divided by its length, which must be as in `norm`; not a number for the zero vector."""
+    """Unit vector a / |a|, for lengths as in `norm`; NaN for the zero vector."""
     return scaled(1.0 / norm(a), a)
 
 
@@ -77,7 +77,7 @@ def matrix_times(m, a):
 
 @physics
 def transposed_times(m, a):
-    """Product of the transpose of a Matrix and a vector: for direction cosines, the way back."""
+    """Product of the transpose of a Matrix and a vector: for direction cosines, the inverse transformation."""
     return Vector(
         m.xx * a.x + m.yx * a.y + m.zx * a.z,
         m.xy * a.x + m.yy * a.y + m.zy * a.z,
