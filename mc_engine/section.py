@@ -26,22 +26,22 @@ class Section(BaseModel):
 class ReportSection(Section):
     """[report]: probability and confidence of the statistics in a report; requirements have their own."""
 
-    probability: Share = Field(default=0.9973, ge=0.5, description="of tolerance limits and percentiles")
-    confidence: Share = Field(default=0.90, ge=0.5, description="with which each bound holds")
+    probability: Share = Field(default=0.9973, ge=0.5, description="probability of tolerance limits and percentiles")
+    confidence: Share = Field(default=0.90, ge=0.5, description="confidence of each bound")
 
     @property
     def outer(self) -> tuple[float, float]:
-        """The percentiles between which a case lies with the probability."""
+        """The percentiles (0 to 1) between which a case lies with the probability."""
         return round(0.5 * (1.0 - self.probability), 12), round(0.5 * (1.0 + self.probability), 12)
 
     @property
     def low(self) -> float:
-        """The percentile above which a case lies with the probability."""
+        """The percentile (0 to 1) above which a case lies with the probability."""
         return round(1.0 - self.probability, 12)
 
     @property
     def percentiles(self) -> tuple[float, ...]:
-        """All that a report tells, ascending."""
+        """The percentiles in a report, ascending."""
         return self.outer[0], self.low, 0.5, self.probability, self.outer[1]
 
     @property

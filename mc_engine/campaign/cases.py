@@ -26,7 +26,7 @@ def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray
 
     campaign : Campaign
     case_ids : int64[n], numbers of the cases, in any order.  For "mc" and "sobol" they may exceed the campaign's number
-        of cases: these are the cases of a longer campaign.
+        of cases: they are then cases of a campaign with more cases.
 
     Returns a dict with one column per dispersion, in file order and declared units: float64[n], bool[n], or object[n]
     of words.  A row depends on (campaign, seed, case_id) alone.
@@ -75,7 +75,7 @@ def _checked_ids(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
 
 
 def is_endless(campaign: Campaign) -> bool:
-    """Whether there are cases beyond the campaign's number of them: those of a longer campaign."""
+    """Whether the design also defines cases beyond the campaign's number, those of a campaign with more cases."""
     return campaign.design in EXTENSIBLE and campaign.upstream is None
 
 
@@ -93,14 +93,14 @@ def _random_table(campaign: Campaign, ids: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def full_inputs(campaign: Campaign, table: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Every parameter and setting: the columns of `table` where there are any, else the one nominal value."""
+    """Every parameter and setting: its column of `table` if there is one, else its nominal value."""
     return {**campaign.nominal, **table}
 
 
 def dispersion_records(campaign: Campaign) -> list[dict[str, Any]]:
-    """One plain record a dispersion, for manifest and report: name, unit, nominal, distribution, bounds, source.
+    """One plain record for each dispersion, for manifest and report: name, unit, nominal, distribution, bounds, source.
 
-    random_draw : true for those that only name a random draw, absent of all others.
+    random_draw : true for a dispersion that only selects a random draw; absent for all others.
     """
     records = []
     for dispersion in campaign.dispersions:
@@ -124,7 +124,7 @@ def dispersion_records(campaign: Campaign) -> list[dict[str, Any]]:
 def _distribution_text(campaign: Campaign, dispersion: Dispersion, unit: str) -> str:
     """Such as "normal, 3σ = 20 %", in the words of the campaign file and the unit of the input's row.
 
-    A sigma has five digits at most: it may come of a covariance, or of another unit.
+    A sigma has five digits at most, since it may come from a covariance, or from another unit.
     """
     if campaign.design == "table":
         return f"column of {campaign.table_path.name}" if campaign.table_path else ""

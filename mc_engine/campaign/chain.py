@@ -27,7 +27,7 @@ _waiting: ContextVar[int] = ContextVar("_waiting", default=0)  # campaigns of th
 
 
 class _Endless(CampaignError):
-    """A chain of campaigns that returns to itself or exceeds `_LONGEST_CHAIN`; reported once, by its first campaign."""
+    """A chain of campaigns that is circular or exceeds `_LONGEST_CHAIN`; reported once, by its first campaign."""
 
 
 def take_inputs(
@@ -39,7 +39,7 @@ def take_inputs(
     load: "Callable[..., Campaign]",
     findings: Findings,
 ) -> "tuple[Upstream | None, Campaign | None]":
-    """The upstream run, and the campaign that has to be flown for it where there is no such run yet.
+    """The upstream run, and the campaign that has to be flown for it if there is no such run yet.
 
     run : used instead of the one that [inputs] names.  load : reads that campaign, as `load_campaign` does.
     """
@@ -92,7 +92,7 @@ def take_inputs(
 
 
 def _check_unasked(run: Path | None, findings: Findings) -> None:
-    """Note a run to take inputs from where [inputs] does not say which; the copy inside a run directory need not be."""
+    """Note a run to take inputs from if the file has no [inputs]; not for the file's copy inside a run directory."""
     from mc_engine.campaign.upstream import COMPANION
 
     written = any(problem.place.split(".")[0] == "inputs" for problem in findings.problems)
@@ -101,7 +101,7 @@ def _check_unasked(run: Path | None, findings: Findings) -> None:
 
 
 def _rows_to_come(first: "Campaign") -> "Rows":
-    """The columns of a run that has yet to be flown, without rows."""
+    """The columns, without rows, of a run that has yet to be flown."""
     from mc_engine.campaign.columns import case_columns
     from mc_engine.campaign.upstream import Rows
     from mc_engine.store.parts import CASE_COLUMNS

@@ -1,7 +1,7 @@
 """The columns of a run's case table after case_id, status and reason.
 
 In order: columns taken from an upstream run, dispersions, metrics, time and state at the end.
-The names alone are needed to fly; what stores the columns is loaded where they are made.
+Flights need only the names, so the code that stores columns is imported where columns are made.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,8 @@
 """Covariances of a campaign file: [covariance.NAME] stands for six normal dispersions and their correlations.
 
-The spread of six parameters is that of an orbit message.  For normal deviates the rank correlation that the copula
-takes, 6 / pi asin(rho / 2), gives back the linear correlation rho (Pearson 1907, see `mc_engine.sampling.correlation`),
-so what is drawn has the covariance of the message.
+The six parameters have the covariance of an orbit message.  For normal deviates the copula with the rank correlation
+6 / pi asin(rho / 2) has the linear correlation rho (Pearson 1907, see `mc_engine.sampling.correlation`), so the samples
+have the covariance of the message.
 """
 
 from collections.abc import Iterator

@@ -24,9 +24,9 @@ _WITHOUT_UNIT = {"dist", "unit", "levels", "source", "note", "log_sigma", "alpha
 
 @dataclass(frozen=True)
 class Dispersion:
-    """One dispersed input: `spec` as written in the file, and its distribution in the parameter's own unit.
+    """One dispersed input: `spec` as written in the file, and its distribution in the unit of the parameter.
 
-    distribution : for the random designs.  levels : for "grid" and "one_at_a_time", one value a level.
+    distribution : for the random designs.  levels : for "grid" and "one_at_a_time", one value for each level.
     """
 
     name: str

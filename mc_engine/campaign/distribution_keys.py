@@ -1,7 +1,7 @@
 """Builds a distribution, in the unit of the model's parameter, from the keys of a [dispersion.NAME].
 
-One function for each distribution checks its keys; bounds truncate the distribution, and what would leave the range
-that the model accepts is refused.
+One function for each distribution checks its keys.  Bounds truncate the distribution.  A distribution that exceeds the
+range which the model accepts is refused.
 """
 
 import math
@@ -141,7 +141,7 @@ def _triangular(context: DispersionContext) -> Distribution | None:
 
 
 def _bounds(context: DispersionContext, middle: str) -> tuple[float, float] | None:
-    """lower and upper as given, or half_range about the middle; the middle's key is idle between plain bounds."""
+    """(lower, upper) as given, or by half_range about the middle; with lower and upper the middle is not used."""
     keys = context.keys
     plain = [keys.lower, keys.upper]
     if keys.half_range is None and None not in plain:

@@ -71,5 +71,5 @@ def described(item: Parameter | Setting) -> str:
 
 
 def number(value: float) -> str:
-    """A number as people write it: no trailing zeros, ten digits at most."""
+    """A number as text: no trailing zeros, ten digits at most."""
     return f"{value:.10g}"

@@ -1,4 +1,4 @@
-"""Reads a campaign from a TOML file: a model, how its inputs are dispersed, and what the results must meet.
+"""Reads a campaign from a TOML file: a model, the dispersions of its inputs, and the requirements on its results.
 
 `load_campaign` reports every mistake of the file at once.  The module itself imports neither numba nor scipy nor
 matplotlib, so that the command line starts fast.  The keys of the file are in `mc_engine.campaign.sections`.
@@ -51,35 +51,35 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign that can be flown: a model, how its inputs are dispersed, and what its results must meet.
+    """A campaign that can be flown: a model, the dispersions of its inputs, and the requirements on its results.
 
     Read one with `load_campaign`.  Numbers are in the units that the model declares.
 
-    name : str, the shipped name ("deorbit/map") or the one that the file's path suggests
+    name : str, the shipped name ("deorbit/map"), or a name made from the path of the file
     title : str, one line for the report
-    text : str, the campaign file as read; `cases` and `seed` may have been replaced since
-    directory : Path, the folder of the file, in which its tables and orbit messages are looked for
+    text : str, the campaign file as read; its `cases` and `seed` may have been replaced by those below
+    directory : Path, the folder of the file, to which the names of tables and orbit messages are relative
     model : Model or Simulator, the system that is flown
     model_reference : str, its module ("campaigns.deorbit") or its file next to the campaign file ("model.py")
     cases : int, number of cases
-    design : str, how the cases are laid out: "mc", "lhs", "sobol", "saltelli", "morris", "grid", "one_at_a_time",
+    design : str, how the cases are generated: "mc", "lhs", "sobol", "saltelli", "morris", "grid", "one_at_a_time",
         "table"
-    seed : int, from which every draw is derived
-    parameters : dict, name to value, what the section [parameters] sets
-    nominal : dict, name to value, every parameter and setting of the model
+    seed : int, from which all random numbers are derived
+    parameters : dict, name to value, the section [parameters]
+    nominal : dict, name to value, all parameters and settings of the model
     dispersions : tuple of Dispersion, the inputs that differ from case to case, in file order
     correlations : tuple of Correlation, rank correlations between dispersions
     requirements : tuple of Requirement, the limits that the results must meet
     retention : HistoriesSection, the cases whose time histories are saved
-    digest : str, SHA-256 of all that decides the inputs of a case or the verdicts.  The number of cases is part of it
-        only for "lhs": an extended campaign is the same campaign.
+    digest : str, SHA-256 of everything on which the inputs of a case or the verdicts depend.  The number of cases is
+        part of it only for "lhs", because extending a run does not change its campaign.
     table_path : Path or None, the file of the design "table"
     table : dict, its columns by name; empty for any other design
     tuning : Tuning or None, the section [tuning]
     upstream : Upstream or None, the run that inputs are taken from
-    first : Campaign or None, the campaign of that run where it has yet to be flown
-    looks : tuple of int, numbers of cases at which `run --until verdict` judges; empty where all cases fly
-    messages : tuple of str, files of orbit messages that covariances were read from
+    first : Campaign or None, the campaign of that run, if it has yet to be flown
+    looks : tuple of int, numbers of cases at which `run --until verdict` makes interim analyses; empty for other runs
+    messages : tuple of str, files of orbit messages from which covariances were read
     sensitivity : SensitivityDesign or None, the section [sensitivity]
     report : ReportSection, probability and confidence of the statistics in the report
 
@@ -126,19 +126,19 @@ def load_campaign(
     directory: Path | None = None,
     upstream: str | Path | None = None,
 ) -> Campaign:
-    """Read a campaign file and check it against its model.
+    """The Campaign of a campaign file, checked against its model.
 
     reference : str or Path, a shipped name ("deorbit", "deorbit/map"), a .toml file, or a folder with a campaign.toml;
-        where `text` is given, only the name of the campaign
+        if `text` is given, the name of the campaign
     cases : int, number of cases in place of the file's
     seed : int, seed in place of the file's
-    text : str, the contents of the file, where they do not come from a file
-    directory : Path, the folder in which `text` looks for its tables; the working folder by default
+    text : str, the contents of the campaign file, if they are not to be read from a file
+    directory : Path, the folder to which the names of files in `text` are relative; the working folder by default
     upstream : str or Path, the run to take inputs from, in place of the one that [inputs] names
 
     Returns the Campaign.
 
-    Raises CampaignError with every mistake of the file, each with its place.
+    Raises CampaignError, which lists every mistake of the file with its location.
 
     >>> campaign = load_campaign("minimal", cases=100, seed=7)
     >>> campaign.cases, campaign.seed

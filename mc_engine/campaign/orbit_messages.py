@@ -1,7 +1,7 @@
 """Position and velocity with their covariance from CCSDS orbit messages: OPM and OEM in keyword notation (KVN).
 
-Read are the state and the 6x6 covariance; units are those of the standard, km and km/s.  Not read: XML, manoeuvres,
-and the covariance of parameters beyond position and velocity.
+The state and the 6x6 covariance are read, in the units of the standard, km and km/s.  XML, manoeuvres, and the
+covariance of parameters beyond position and velocity are not supported.
 
 CCSDS 502.0-B-3, Orbit Data Messages (2023), sections 3 (OPM), 5 (OEM) and 7 (KVN syntax).
 """
@@ -26,7 +26,7 @@ _UNITS |= {name: ("km**2", "km**2/s", "km**2/s**2")[(i > 2) + (j > 2)] for name,
 
 
 class MessageFault(Exception):
-    """What is wrong with a message, as one sentence; who reads the campaign file adds the place."""
+    """An error in a message, as one sentence; the reader of the campaign file adds the location."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class UncertainState:
     def covariance_in(self, frame: str) -> np.ndarray:
         """The covariance in other axes: "RTN", "TNW", or the frame of the state itself.
 
-        The local axes stand still, as they are at the epoch: both blocks turn alike, and the velocity has no part of
-        the axes' own turning.  MessageFault for any other pair of frames, and without a state to lay axes along.
+        The local axes are taken as inertial, as they are at the epoch: position and velocity are rotated by the same
+        matrix, without the rate of the axes.  MessageFault for any other pair of frames, and without a state.
         """
         wanted = _plain_frame(frame)
         if wanted == self.covariance_frame:
@@ -78,7 +78,7 @@ class UncertainState:
 
 
 def read_message(text: str) -> list[UncertainState]:
-    """Every covariance of an OPM or OEM, in the order of the text; MessageFault says what is wrong, with its line."""
+    """Every covariance of an OPM or OEM, in the order of the text; MessageFault with the line if it is invalid."""
     lines = [(number, line.strip()) for number, line in enumerate(text.lstrip("\ufeff").splitlines(), start=1)]
     lines = [(number, line) for number, line in lines if line and not line.startswith("COMMENT")]
     first = lines[0][1].partition("=")[0].strip() if lines else ""

@@ -51,7 +51,7 @@ class Correlation:
 
 @dataclass(frozen=True)
 class Requirement:
-    """`share` of the cases must keep `metric` within the limits, shown with `confidence`.  A limit may be None."""
+    """`metric` must be inside the limits with probability `share`, demonstrated with `confidence`.  None: no limit."""
 
     name: str
     metric: str
@@ -65,7 +65,7 @@ class Requirement:
 def system_of(
     document: Mapping[str, Any], program: SimulatorSection | None, directory: Path, findings: Findings
 ) -> System | None:
-    """What flies, even where other keys of [campaign] are wrong: the rest of the file is checked against it."""
+    """The model or simulator, even if other keys of [campaign] are wrong: the rest of the file is checked with it."""
     section, inside = document.get("campaign"), findings.under("campaign")
     if not isinstance(section, dict):
         return None

@@ -1,4 +1,4 @@
-"""Reads the sections of a campaign file; each mistake becomes one sentence with its place in the file.
+"""Reads the sections of a campaign file; each mistake becomes one sentence with its location in the file.
 
 A mistake in one section does not hide those in others: each table is validated separately (pydantic).
 """
@@ -166,7 +166,7 @@ def read_sections(document: dict[str, Any], findings: Findings) -> Sections:
 
 
 def _note_what_flies(document: dict[str, Any], findings: Findings) -> None:
-    """Note a file that names nothing to fly, or two things."""
+    """Note a file that names neither a model nor a simulator, or both."""
     section = document.get("campaign")
     named = [key for key in ("model", "simulator") if isinstance(section, dict) and key in section]
     if "simulator" in document:

@@ -78,7 +78,7 @@ def model_sources() -> dict[str, str]:
 def find_campaign(reference: str | Path) -> Path:
     """The file of a shipped name, of a path to a .toml file, or of a folder that holds campaign.toml.
 
-    A shipped name goes before a folder of that name; write "./deorbit" for the folder.
+    A shipped name takes precedence over a folder of that name; write "./deorbit" for the folder.
     """
     text = str(reference)
     shipped = _shipped()
@@ -113,7 +113,7 @@ def campaign_text(path: Path) -> str:
 
 
 def campaign_name(path: Path) -> str:
-    """The shipped name of a file, or the name that its path suggests."""
+    """The shipped name of a file, or a name made from its path."""
     path = path.resolve()
     for name, shipped in _shipped().items():
         if shipped == path:

@@ -44,7 +44,7 @@ def _not_tiny(value: float) -> float:
 
 
 def _printable(value: str) -> str:
-    """Text that is shown as it is written: nothing in it steers a terminal or hides from the eye."""
+    """Text of printable characters: none that controls a terminal or is invisible."""
     if not value.replace("\n", "").replace("\t", "").isprintable():
         raise PydanticCustomError("not_printable", "letters that cannot be seen")
     return value
@@ -72,18 +72,21 @@ class CampaignSection(Section):
         default=None, min_length=1, description='a module such as "campaigns.deorbit", or "model.py" beside this file'
     )
     simulator: str | None = Field(
-        default=None, min_length=1, description='in place of a model: a module, or "sim.py" beside this file'
+        default=None, min_length=1, description='in place of model: a module, or "sim.py" beside this file'
     )
     cases: int | None = Field(default=None, ge=1, le=MOST_CASES, description="number of cases; random designs only")
-    design: DesignName = Field(description="how the cases are laid out")
+    design: DesignName = Field(description="how the cases are generated")
     seed: int | None = Field(
         default=None, ge=0, le=2**63 - 1, description="any whole number from 0 on; random designs only"
     )
     table: str | None = Field(
-        default=None, min_length=1, description='CSV or Parquet beside this file, with design = "table"'
+        default=None, min_length=1, description='CSV or Parquet beside this file; for design = "table"'
     )
     max_steps: int | None = Field(
-        default=None, ge=1, le=MOST_STEPS, description="integration steps of a case, then it ends as step-limit"
+        default=None,
+        ge=1,
+        le=MOST_STEPS,
+        description="most integration steps; a case that needs more ends as step-limit",
     )
     title: Line = Field(default="", description="one line for the report")
     note: Note = ""
@@ -94,17 +97,17 @@ class DispersionSection(Section):
 
     unit: Line | None = Field(default=None, description="unit of the numbers here; default: the parameter's own")
     levels: int | None = Field(
-        default=None, ge=2, le=MOST_LEVELS, description="grid, one_at_a_time: so many equal steps"
+        default=None, ge=2, le=MOST_LEVELS, description="for grid and one_at_a_time: number of equally spaced levels"
     )
     values: list[Value] | None = Field(
-        default=None, min_length=1, description="the levels themselves, or what discrete draws"
+        default=None, min_length=1, description="for grid and one_at_a_time: the levels; for discrete: the values"
     )
-    source: Line = Field(default="", description="where the spread comes from, for the report")
+    source: Line = Field(default="", description="source of the dispersion, shown in the report")
     note: Note = ""
 
 
 class LevelsDispersion(DispersionSection):
-    """No distribution: the levels of a grid, or the source of a table's column."""
+    """Without dist: levels of an input for grid and one_at_a_time, or unit and source of a column for table."""
 
     mean: Number | None = None
     half_range: Positive | None = None
@@ -116,42 +119,42 @@ class LevelsDispersion(DispersionSection):
 class NormalDispersion(DispersionSection):
     dist: Literal["normal"]
     mean: Number | None = Field(default=None, description="default: the nominal value")
-    sigma: Positive | None = Field(default=None, description="standard deviation, before any cut")
-    three_sigma: Positive | None = Field(default=None, description="three times that, in place of sigma")
-    lower: Number | None = Field(default=None, description="cuts the distribution")
-    upper: Number | None = Field(default=None, description="cuts the distribution")
+    sigma: Positive | None = Field(default=None, description="standard deviation, before truncation")
+    three_sigma: Positive | None = Field(default=None, description="three standard deviations, in place of sigma")
+    lower: Number | None = Field(default=None, description="the distribution is truncated below it")
+    upper: Number | None = Field(default=None, description="the distribution is truncated above it")
 
 
 class UniformDispersion(DispersionSection):
-    """lower and upper, or half_range about mean."""
+    """Needs lower and upper, or half_range about mean."""
 
     dist: Literal["uniform"]
-    mean: Number | None = Field(default=None, description="default: the nominal value")
+    mean: Number | None = Field(default=None, description="middle of the range; default: the nominal value")
     half_range: Positive | None = Field(default=None, description="half of upper - lower")
-    lower: Number | None = Field(default=None, description="where the distribution begins")
-    upper: Number | None = Field(default=None, description="where the distribution ends")
+    lower: Number | None = Field(default=None, description="smallest value")
+    upper: Number | None = Field(default=None, description="largest value")
 
 
 class TriangularDispersion(DispersionSection):
-    """lower and upper, or half_range about mode."""
+    """Needs lower and upper, or half_range about mode."""
 
     dist: Literal["triangular"]
-    mode: Number | None = Field(default=None, description="default: the nominal value")
+    mode: Number | None = Field(default=None, description="most probable value; default: the nominal value")
     half_range: Positive | None = Field(default=None, description="half of upper - lower")
-    lower: Number | None = Field(default=None, description="where the distribution begins")
-    upper: Number | None = Field(default=None, description="where the distribution ends")
+    lower: Number | None = Field(default=None, description="smallest value")
+    upper: Number | None = Field(default=None, description="largest value")
 
 
 class LognormalDispersion(DispersionSection):
-    """median and log_sigma (standard deviation of ln x), or mean and sigma (of x itself)."""
+    """Needs median and log_sigma (standard deviation of ln x), or mean and sigma (of x itself)."""
 
     dist: Literal["lognormal"]
     median: Positive | None = Field(default=None, description="default: the nominal value")
     log_sigma: Annotated[float, Field(gt=0.0, le=10.0)] | None = None
     mean: Positive | None = Field(default=None, description="default: the nominal value")
     sigma: Positive | None = None
-    lower: Number | None = Field(default=None, description="cuts the distribution")
-    upper: Number | None = Field(default=None, description="cuts the distribution")
+    lower: Number | None = Field(default=None, description="the distribution is truncated below it")
+    upper: Number | None = Field(default=None, description="the distribution is truncated above it")
 
 
 class BetaDispersion(DispersionSection):
@@ -160,39 +163,39 @@ class BetaDispersion(DispersionSection):
     dist: Literal["beta"]
     alpha: Positive = Field(description="a positive number")
     beta: Positive = Field(description="a positive number")
-    lower: Number = Field(description="where the distribution begins")
-    upper: Number = Field(description="where the distribution ends")
+    lower: Number = Field(description="smallest value")
+    upper: Number = Field(description="largest value")
 
 
 class ExponentialDispersion(DispersionSection):
-    """Begins at origin; its mean is origin + scale."""
+    """Values from origin on; the mean is origin + scale."""
 
     dist: Literal["exponential"]
-    scale: Positive = Field(description="mean distance from the origin")
-    origin: Number | None = Field(default=None, description="default: the nominal value")
-    lower: Number | None = Field(default=None, description="cuts the distribution")
-    upper: Number | None = Field(default=None, description="cuts the distribution")
+    scale: Positive = Field(description="mean distance from origin, before truncation")
+    origin: Number | None = Field(default=None, description="smallest value; default: the nominal value")
+    lower: Number | None = Field(default=None, description="the distribution is truncated below it")
+    upper: Number | None = Field(default=None, description="the distribution is truncated above it")
 
 
 class DiscreteDispersion(DispersionSection):
     dist: Literal["discrete"]
-    values: list[Value] = Field(min_length=1, description="what is drawn")
+    values: list[Value] = Field(min_length=1, description="the values, one of which each case has")
     weights: list[Annotated[float, Field(ge=0.0, le=LARGEST)]] | None = Field(
-        default=None, description="default: equal; need not sum to 1"
+        default=None, description="relative probabilities of the values; default: equal; need not sum to 1"
     )
 
 
 class EmpiricalDispersion(DispersionSection):
     dist: Literal["empirical"]
-    file: str = Field(min_length=1, description="CSV or Parquet beside this file; each draw is one of its numbers")
-    column: str | None = Field(default=None, description="which column, where the file has more than one")
-    lower: Number | None = Field(default=None, description="leaves out the numbers below")
-    upper: Number | None = Field(default=None, description="leaves out the numbers above")
+    file: str = Field(min_length=1, description="CSV or Parquet beside this file; each case has one of its numbers")
+    column: str | None = Field(default=None, description="the column, if the file has more than one")
+    lower: Number | None = Field(default=None, description="smaller numbers of the file are left out")
+    upper: Number | None = Field(default=None, description="larger numbers of the file are left out")
 
 
 class ConstantDispersion(DispersionSection):
     dist: Literal["constant"]
-    value: Value = Field(description="the same for every case")
+    value: Value = Field(description="the value of all cases")
 
 
 DISTRIBUTIONS: dict[str, type[DispersionSection]] = {
@@ -209,7 +212,7 @@ DISTRIBUTIONS: dict[str, type[DispersionSection]] = {
 
 
 class CorrelationSection(Section):
-    """[[correlation]]: one pair of dispersions; several entries make one matrix."""
+    """[[correlation]]: rank correlation of one pair of dispersions; all entries together make one matrix."""
 
     between: list[str] = Field(min_length=2, max_length=2, description="the names of two dispersions")
     rank: float = Field(gt=-1.0, lt=1.0, description="Spearman rank correlation, between -1 and 1")
@@ -218,7 +221,7 @@ class CorrelationSection(Section):
 
 
 class CovarianceSection(Section):
-    """[covariance.NAME]: the covariance of an orbit message as the spread of six parameters."""
+    """[covariance.NAME]: the covariance of an orbit message as normal dispersions of six parameters."""
 
     file: str = Field(min_length=1, description="a CCSDS OPM or OEM (KVN) beside this file")
     parameters: list[str] = Field(
@@ -227,31 +230,31 @@ class CovarianceSection(Section):
     frame: str = Field(
         min_length=1, description="axes of the parameters: RTN, TNW, or the frame of the message's state"
     )
-    epoch: str | None = Field(default=None, description="which covariance, where an OEM has more than one")
+    epoch: str | None = Field(default=None, description="epoch of the covariance, if an OEM has more than one")
     source: Line = ""
     note: Note = ""
 
 
 class RequirementSection(Section):
-    """[requirement.NAME]: at_most, at_least or both, by `share` of the cases with `confidence`."""
+    """[requirement.NAME]: a limit on a metric: at_most, at_least or both."""
 
     metric: str = Field(description="a metric of the model")
     at_most: Number | None = Field(default=None, description="upper limit of the metric")
     at_least: Number | None = Field(default=None, description="lower limit of the metric")
-    share: Share = Field(default=0.9973, description="probability required of a case to keep the limits")
-    confidence: Share = Field(default=0.90, description="with which the cases must demonstrate it")
+    share: Share = Field(default=0.9973, description="required probability of being inside the limits")
+    confidence: Share = Field(default=0.90, description="confidence of its demonstration by the cases")
     source: Line = ""
     note: Note = ""
 
 
 class WorstSection(Section):
-    """[retention.histories] worst: a table in braces, or a list of them."""
+    """`worst` in [retention.histories]: the worst cases of a metric; a table in braces, or a list of such tables."""
 
     metric: str = Field(description="a metric of the model")
-    count: int = Field(default=5, ge=1, le=1000, description="how many of them")
+    count: int = Field(default=5, ge=1, le=1000, description="number of worst cases")
     side: Literal["largest", "smallest"] | None = Field(
         default=None,
-        description="by default those with the smallest margin to a limit; without a requirement, the largest",
+        description="default: the smallest margins to a limit; without a requirement, the largest values",
     )
 
 
@@ -265,14 +268,14 @@ class HistoriesSection(Section):
     """[retention.histories]: the cases whose time histories are saved."""
 
     nominal: bool = Field(default=True, description="the nominal case")
-    first: int = Field(default=0, ge=0, le=100_000, description="so many of the first cases")
-    cases: list[Annotated[int, Field(ge=0)]] = Field(default_factory=list, description="these cases")
-    rows: int = Field(default=1500, ge=10, le=1_000_000, description="about how many rows each history has")
+    first: int = Field(default=0, ge=0, le=100_000, description="number of cases, from the first one on")
+    cases: list[Annotated[int, Field(ge=0)]] = Field(default_factory=list, description="case numbers")
+    rows: int = Field(default=1500, ge=10, le=1_000_000, description="approximate number of rows of each history")
     worst: Worst | None = Field(default=None, description="the worst cases of a metric")
 
     @property
     def worst_of(self) -> list[WorstSection]:
-        """Of each metric whose worst cases are asked for, how many and on which side."""
+        """The tables of `worst`, as a list."""
         return [self.worst] if isinstance(self.worst, WorstSection) else self.worst or []
 
 
@@ -285,55 +288,55 @@ class RetentionSection(Section):
 class TunedSection(Section):
     """[tuning.parameter.NAME]: the range in which a parameter may be chosen."""
 
-    lower: Number = Field(description="the smallest value that may be chosen")
-    upper: Number = Field(description="the largest value that may be chosen")
+    lower: Number = Field(description="smallest value that the search may choose")
+    upper: Number = Field(description="largest value that the search may choose")
     source: Line = ""
     note: Note = ""
 
 
 class ObjectiveSection(Section):
-    """[tuning.objective.NAME]: what is to be as small or as large as possible."""
+    """[tuning.objective.NAME]: a metric to be minimised or maximised."""
 
     metric: str = Field(description="a metric of the model")
     goal: Literal["minimise", "maximise"] = "minimise"
     quantile: Share | None = Field(
-        default=None, description="this quantile over the dispersed cases; default: the nominal case"
+        default=None, description="optimise this quantile over the dispersed cases; default: the nominal case"
     )
     note: Note = ""
 
 
 class ConstraintSection(Section):
-    """[tuning.constraint.NAME]: at_most, at_least or both."""
+    """[tuning.constraint.NAME]: a limit on a metric: at_most, at_least or both."""
 
     metric: str = Field(description="a metric of the model")
     at_most: Number | None = None
     at_least: Number | None = None
     quantile: Share | None = Field(
-        default=None, description="this quantile over the dispersed cases; default: the nominal case"
+        default=None, description="limit this quantile over the dispersed cases; default: the nominal case"
     )
     source: Line = ""
     note: Note = ""
 
 
 class PublishedPointSection(Section):
-    """[[tuning.published]]: a point to be drawn beside the front."""
+    """[[tuning.published]]: a published solution, drawn in the figures of the front."""
 
-    name: Line = Field(min_length=1, description="what the report calls the point")
-    values: dict[str, Number] = Field(description="a number for every objective, by its name")
+    name: Line = Field(min_length=1, description="name of the point in the report")
+    values: dict[str, Number] = Field(description="the value of every objective, by the objective's name")
     source: Line = ""
 
 
 class TuningSection(Section):
-    """[tuning]: which parameters `mc-engine tune` chooses, what for, and how long it searches (NSGA-II)."""
+    """[tuning]: parameters, objectives, constraints and settings of the search by `mc-engine tune` (NSGA-II)."""
 
     parameter: dict[str, TunedSection] = Field(default_factory=dict)
     objective: dict[str, ObjectiveSection] = Field(default_factory=dict)
     constraint: dict[str, ConstraintSection] = Field(default_factory=dict)
     published: list[PublishedPointSection] = Field(default_factory=list)
     population: int = Field(default=48, ge=4, le=100_000, description="candidates in a generation")
-    generations: int = Field(default=60, ge=1, le=100_000, description="generations, the first one among them")
+    generations: int = Field(default=60, ge=1, le=100_000, description="number of generations, including the first")
     patience: int | None = Field(
-        default=None, ge=1, description="stop when so many generations in a row bring nothing; default: never"
+        default=None, ge=1, description="stop after this many generations in a row without progress; default: never"
     )
     seed: int | None = Field(default=None, ge=0, le=2**32 - 1, description="of the search; default: that of [campaign]")
     crossover: float = Field(default=0.9, ge=0.0, le=1.0, description="probability that two parents are crossed")
@@ -341,7 +344,7 @@ class TuningSection(Section):
         default=None,
         gt=0.0,
         le=1.0,
-        description="probability that a parameter mutates; default: 1 / number tuned",
+        description="probability that a parameter mutates; default: 1 / number of tuned parameters",
     )
 
 
@@ -352,38 +355,38 @@ AnyDispersion = (
 
 
 class InputsSection(Section):
-    """[inputs]: parameters that every case takes from the same case of another run, flown before."""
+    """[inputs]: parameters that every case takes from the case with its number in another run, flown before."""
 
     source: str = Field(alias="from", min_length=1, description='a run, or the campaign to be flown first: "deorbit"')
     columns: dict[str, str] = Field(
         default_factory=dict,
-        description="parameter = column of that run; results that have a parameter's name need no line here",
+        description="parameter = column of that run; not needed for results with the name of a parameter",
     )
     note: Note = ""
 
 
 class SensitivitySection(Section):
-    """[sensitivity]: flights beside the cases, from which the contributions of inputs to each metric are computed."""
+    """[sensitivity]: additional flights, from which the contributions of the inputs to each metric are computed."""
 
     cases: int = Field(ge=32, le=10_000_000, description="base cases; each is flown twice, and once for each group")
-    group: dict[str, list[str]] = Field(default_factory=dict, description="dispersions computed together, by group")
+    group: dict[str, list[str]] = Field(default_factory=dict, description="dispersions analysed together, by group")
 
 
 class CampaignFile(Section):
-    """A campaign of mc-engine: a model, the spread of its inputs, and what the results must meet."""
+    """A campaign of mc-engine: a model, the dispersions of its inputs, and the requirements on its results."""
 
     campaign: CampaignSection = Field(description="the table [campaign] with model, design, ...")
     parameters: dict[str, Value] = Field(default_factory=dict, description="other nominal values and settings")
     dispersion: dict[str, AnyDispersion] = Field(default_factory=dict, description="spread of inputs, by parameter")
-    correlation: list[CorrelationSection] = Field(default_factory=list, description="pairs of dispersions")
-    covariance: dict[str, CovarianceSection] = Field(default_factory=dict, description="of orbit messages")
-    inputs: InputsSection | None = Field(default=None, description="what is taken from another run, case by case")
-    requirement: dict[str, RequirementSection] = Field(default_factory=dict, description="limits on metrics")
-    retention: RetentionSection = Field(default_factory=RetentionSection, description="saved time histories")
+    correlation: list[CorrelationSection] = Field(default_factory=list, description="of pairs of dispersions")
+    covariance: dict[str, CovarianceSection] = Field(default_factory=dict, description="from orbit messages, by name")
+    inputs: InputsSection | None = Field(default=None, description="inputs taken from another run, case by case")
+    requirement: dict[str, RequirementSection] = Field(default_factory=dict, description="limits on metrics, by name")
+    retention: RetentionSection = Field(default_factory=RetentionSection, description="time histories to save")
     sensitivity: SensitivitySection | None = Field(default=None, description="contributions of the inputs")
     simulator: SimulatorSection | None = Field(default=None, description="a program or FMU, in place of a model")
     report: ReportSection = Field(default_factory=ReportSection, description="probability and confidence of the report")
-    tuning: TuningSection | None = Field(default=None, description="for `mc-engine tune`")
+    tuning: TuningSection | None = Field(default=None, description="search for the best parameters by `mc-engine tune`")
 
 
 def schema() -> dict[str, Any]:

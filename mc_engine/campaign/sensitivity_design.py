@@ -1,9 +1,9 @@
 """The section [sensitivity]: a pick-freeze design, flown besides the run, for first-order and total Sobol' indices.
 
-Its cases form a campaign of their own, the companion, and come in blocks (`statistics.pick_freeze`): groups of inputs
-are exchanged between independent points of the campaign's own distributions.  A group is one dispersion, the
+Its cases are a separate campaign, the companion, in blocks (see `statistics.pick_freeze`): groups of inputs are
+exchanged between independent points drawn from the campaign's distributions.  A group is one dispersion, the
 dispersions that a [sensitivity.group] names or that are correlated, the cases of the upstream run, or the random draws:
-noise made in flight and the parameters that name a draw.
+noise made in flight and the parameters that select a draw.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -38,14 +38,14 @@ _NOISE = 2**50  # where no case of a run draws its noise
 
 @dataclass(frozen=True)
 class SensitivityDesign:
-    """cases : base cases, one a block.  groups : dispersions by the name of their group, each in exactly one."""
+    """cases : base cases, one for each block.  groups : dispersions by group; each is in exactly one group."""
 
     cases: int
     groups: Mapping[str, tuple[str, ...]]
 
     @property
     def layout(self) -> BlockLayout:
-        """How the rows of a block lie."""
+        """The arrangement of the rows of a block."""
         repeated = (RANDOM_DRAWS,) if RANDOM_DRAWS in self.groups else ()
         held = repeated if self.groups.get(RANDOM_DRAWS) else ()  # noise made in flight has no nominal value
         return BlockLayout(tuple(self.groups), repeated, held)
@@ -139,13 +139,13 @@ def _check_group(group: str, members: Sequence[str], dispersed: Sequence[str], f
 
 
 def names_a_draw(model: System, name: str) -> bool:
-    """Whether an input only names a random draw, as a seed does."""
+    """Whether an input only selects a random draw, as a seed does."""
     item = model.input(name)
     return isinstance(item, Parameter) and item.random_draw
 
 
 def companion(campaign: "Campaign") -> "Campaign":
-    """The campaign of the flights beside `campaign`, which has a [sensitivity]."""
+    """The campaign of the additional flights for `campaign`, which has a [sensitivity]."""
     assert campaign.sensitivity is not None  # the caller looked
     asked = "/".join((campaign.digest, DESIGN, *campaign.sensitivity.layout.held))
     digest = sha256(asked.encode()).hexdigest()
@@ -155,7 +155,7 @@ def companion(campaign: "Campaign") -> "Campaign":
 
 
 def sensitivity_record(campaign: "Campaign") -> dict[str, Any]:
-    """What the manifest of a companion says of its design; `cases` are those of the run that it belongs to."""
+    """The record of the design in the manifest of a companion; its `cases` are those of the run it belongs to."""
     assert campaign.sensitivity is not None  # the caller looked
     chosen = campaign.sensitivity
     groups = [{"name": name, "members": list(members)} for name, members in chosen.groups.items()]
@@ -195,7 +195,7 @@ def _point_columns(
 ) -> list[np.ndarray]:
     """Uniform numbers of the k-th point of each block, a column a dispersion, correlated as the campaign's.
 
-    A and B are one point of a scrambled Sobol' sequence of twice the dimensions; C, and what names a draw, is random.
+    A and B are one point of a scrambled Sobol' sequence with twice the dimensions; C and random draws are random.
     """
     streams = [f"{name}/{DESIGN} {_POINTS[k]}" for name in names]
     columns = list(uniform_columns(campaign.seed, streams, blocks))
@@ -212,7 +212,7 @@ def _point_columns(
 
 
 def noise_ids(campaign: "Campaign", case_ids: np.ndarray) -> np.ndarray:
-    """int64[n]: the addresses of the noise made in flight; of a run its cases, of a companion those of its points."""
+    """int64[n]: the addresses of the noise made in flight: for a run its cases, for a companion those of its points."""
     if campaign.design != DESIGN:
         return case_ids
     layout, block, row = _blocks(campaign, case_ids)
@@ -221,7 +221,7 @@ def noise_ids(campaign: "Campaign", case_ids: np.ndarray) -> np.ndarray:
 
 
 def upstream_ids(campaign: "Campaign", case_ids: np.ndarray) -> np.ndarray:
-    """int64[n]: the cases upstream that cases take their inputs from; a companion draws them with replacement."""
+    """int64[n]: the upstream cases from which cases take inputs; for a companion they are drawn with replacement."""
     if campaign.design != DESIGN or campaign.upstream is None:
         return case_ids
     layout, block, row = _blocks(campaign, case_ids)

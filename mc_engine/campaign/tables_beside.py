@@ -1,7 +1,7 @@
 """Tables in files next to a campaign file: cases of the design "table", numbers of "empirical" distributions.
 
-CSV (comma, UTF-8, names in the first line) or Parquet.  Every mistake is one sentence with file, row and column.  File
-size and number of cells are limited, so that no file fills the memory.
+CSV (comma, UTF-8, names in the first line) or Parquet.  Every mistake is reported as one sentence with file, row and
+column.  File size and number of cells are limited, so that no file fills the memory.
 """
 
 import csv
@@ -162,7 +162,7 @@ def switches(path: Path, name: str, cells: np.ndarray) -> np.ndarray:
 
 
 def empirical_numbers(path: Path, column: str | None) -> tuple[float, ...]:
-    """The finite numbers of one column, sorted.  A CSV file of one column may do without a name."""
+    """The finite numbers of one column, sorted.  A CSV file with one column needs no name."""
     columns = read_columns(path)
     headless = path.suffix.lower() not in _PARQUET and all(is_real(name) for name in columns)
     if headless and (column is not None or len(columns) > 1):

@@ -25,7 +25,7 @@ class Tuned(TunedSection):
 
 
 class Objective(ObjectiveSection):
-    """A metric to minimise or maximise: of the nominal case, or this quantile over the dispersed ones."""
+    """A metric to minimise or maximise: its value in the nominal case, or a quantile over the dispersed cases."""
 
     name: str
 
@@ -35,7 +35,7 @@ class Objective(ObjectiveSection):
 
 
 class Constraint(ConstraintSection):
-    """Limits on a metric of the nominal case, or on this quantile over the dispersed ones."""
+    """Limits on a metric: on its value in the nominal case, or on a quantile over the dispersed cases."""
 
     name: str
 
@@ -46,7 +46,7 @@ class Constraint(ConstraintSection):
 
 @dataclass(frozen=True)
 class Tuning:
-    """What `mc-engine tune` searches.  seed, mutation: None for the campaign's own, and 1 in all tuned parameters."""
+    """The search of `mc-engine tune`.  seed None: that of the campaign;  mutation None: 1 / number of parameters."""
 
     parameters: tuple[Tuned, ...]
     objectives: tuple[Objective, ...]
@@ -66,17 +66,17 @@ class Tuning:
 
     @property
     def signs(self) -> np.ndarray:
-        """float64[n_objectives]: by which the objectives are multiplied, so that all are to be small."""
+        """float64[n_objectives]: the factors, 1 or -1, that make all objectives ones to be minimised."""
         return np.array([1.0 if objective.large_is_bad else -1.0 for objective in self.objectives])
 
     @property
     def nominal(self) -> bool:
-        """Whether the nominal case of a candidate is looked at."""
+        """Whether the nominal case of a candidate is flown."""
         return any(measure.quantile is None for measure in self.measures)
 
     @property
     def robust(self) -> bool:
-        """Whether the dispersed cases of a candidate are looked at."""
+        """Whether the dispersed cases of a candidate are flown."""
         return any(measure.quantile is not None for measure in self.measures)
 
 

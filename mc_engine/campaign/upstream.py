@@ -62,7 +62,7 @@ class Rows:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of table and facts, whatever the file that they lie in: its bytes change with versions of Arrow."""
+        """SHA-256 of table and facts, not of their file, whose bytes change with the version of Arrow."""
         digest = sha256(self._all_facts().encode())
         for column in self.columns:
             values = self.table[column.name]
@@ -77,11 +77,11 @@ class Rows:
 
 @dataclass(frozen=True)
 class Upstream:
-    """What a campaign takes from an upstream run.
+    """The inputs and columns that a campaign takes from an upstream run.
 
-    links : input of the model to the upstream column that it takes its values from.  columns : upstream columns that
+    links : input of the model to the upstream column from which it takes its values.  columns : upstream columns that
         every row of the campaign keeps, under names that its own columns do not use.  names : upstream column to its
-        name here. table : their values, and those of the linked inputs in the model's units.  nominal : the linked
+        name here.  table : their values, and those of the linked inputs in the model's units.  nominal : the linked
         inputs of the nominal case.  failed : bool[n], upstream cases that did not complete.
     """
 
@@ -144,7 +144,7 @@ def _rows_of_copy(path: Path) -> Rows:
 
 
 def _copy_problem(table: pa.Table, columns: tuple[Column, ...], nominal: Mapping[str, Any]) -> str:
-    """Why the engine cannot have written a copy; empty if every column is there, with its type and no missing value."""
+    """Why a copy is not as the engine writes it; empty if all columns exist, with their types and all values."""
     if not table.schema.equals(arrow_schema(columns)) or any(column.null_count for column in table.columns):
         return "its columns are not those that it names, or have missing values"
     if not np.array_equal(table["case_id"].to_numpy(), np.arange(table.num_rows)):
@@ -158,9 +158,9 @@ def _copy_problem(table: pa.Table, columns: tuple[Column, ...], nominal: Mapping
 
 
 def find_run(reference: str, directory: Path) -> Path | None:
-    """The run directory that `reference` names: beside the campaign file, or from the working folder.
+    """The run directory that `reference` names, relative to the campaign file or to the working folder.
 
-    The campaign file of a run directory, which may come from anyone, leads to the copy in that directory alone.
+    The campaign file in a run directory, which may come from anyone, can name only the copy in that directory.
     """
     if (directory / JOURNAL).is_file():
         return directory / COMPANION

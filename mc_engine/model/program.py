@@ -37,11 +37,13 @@ _OF_THE_RECORD = {"time_limit_s", "memory_limit_mib", "slots", "keep", "determin
 class NumberSection(Section):
     """[simulator.output]: a column of the time history."""
 
-    unit: str | None = Key(default=None, description="by default the one that the name ends in")
+    unit: str | None = Key(default=None, description="default: the unit at the end of the name")
     description: str = ""
-    low: float | None = Key(default=None, description="smallest possible value; smaller inputs are refused")
-    high: float | None = Key(default=None, description="largest possible value; larger inputs are refused")
-    variable: str | None = Key(default=None, min_length=1, description="variable of the FMU; default: its name")
+    low: float | None = Key(default=None, description="smallest possible value; a smaller input is refused")
+    high: float | None = Key(default=None, description="largest possible value; a larger input is refused")
+    variable: str | None = Key(
+        default=None, min_length=1, description="variable of the FMU; default: the name of this table"
+    )
 
 
 class ParameterSection(NumberSection):
@@ -54,14 +56,16 @@ class MetricSection(NumberSection):
     """[simulator.metric]: a result, read by key, path or pattern, or taken from a variable of an FMU."""
 
     read: str | None = Key(
-        default=None, min_length=1, description="key or dotted path in the result; default: its name"
+        default=None, min_length=1, description="key or dotted path in the result; default: the name of this table"
     )
-    pattern: str | None = Key(default=None, min_length=1, description="regular expression over stdout, with one group")
+    pattern: str | None = Key(
+        default=None, min_length=1, description="regular expression with one group, searched in stdout"
+    )
     take: Literal["final", "max", "min", "time_of_max", "crossing"] | None = Key(
-        default=None, description="of a variable's history; default: final"
+        default=None, description="value taken of an FMU variable's history; default: final"
     )
-    level: float | None = Key(default=None, description="that a crossing is the first time of")
-    sometimes: bool = Key(default=False, description="it may be missing, or not a number")
+    level: float | None = Key(default=None, description="for a crossing: its level; the metric is the first time")
+    sometimes: bool = Key(default=False, description="the metric may be missing or NaN")
 
 
 class SimulatorSection(Section):
@@ -69,36 +73,57 @@ class SimulatorSection(Section):
 
     command: list[str] = Key(
         default_factory=list,
-        description="the executable and its arguments, without a shell; none for `mc-engine import`",
+        description="the executable and its arguments, started without a shell; none for `mc-engine import`",
     )
-    fmu: str | None = Key(default=None, min_length=1, description="an FMU of FMI 2 or 3, in place of a command")
+    fmu: str | None = Key(default=None, min_length=1, description="an FMU of FMI 2 or 3, in place of command")
     stop_time_s: float | None = Key(default=None, gt=0.0, le=LONGEST_S, description="end of the flight of an FMU")
-    step_s: float | None = Key(default=None, gt=0.0, description="communication step of an FMU, and of its history")
+    step_s: float | None = Key(
+        default=None, gt=0.0, description="communication step of an FMU, and interval of its history"
+    )
     interface: Literal["co-simulation", "model-exchange"] | None = Key(
-        default=None, description="of an FMU that has both; default: co-simulation"
+        default=None, description="for an FMU with both interfaces; default: co-simulation"
     )
     solver_tolerance: float | None = Key(
-        default=None, gt=0.0, lt=1.0, description="relative, of the solver; default: that of the FMU, or 1e-8"
+        default=None, gt=0.0, lt=1.0, description="relative tolerance of the solver; default: that of the FMU, or 1e-8"
     )
     title: str = ""
     input: dict[str, str] = Key(
-        default_factory=lambda: {"case.json": JSON_INPUT}, description="files that it reads = their templates"
+        default_factory=lambda: {"case.json": JSON_INPUT}, description="input files of the program = their templates"
     )
-    result: str | None = Key(default=None, min_length=1, description="the file that it writes, .json or .csv")
-    history: str | None = Key(default=None, min_length=1, description="a CSV, whose first column is the time t_s")
-    echo: str | None = Key(default=None, min_length=1, description="path in the result of the inputs that it used")
-    files: list[str] = Key(
-        default_factory=list, description="further files beside this one that the program is made of"
+    result: str | None = Key(default=None, min_length=1, description="result file of the program, .json or .csv")
+    history: str | None = Key(
+        default=None, min_length=1, description="history file of the program, a CSV whose first column is the time t_s"
     )
-    time_limit_s: float | None = Key(default=None, gt=0.0, le=LONGEST_S, description="time of a case")
-    memory_limit_mib: float | None = Key(default=None, gt=0.0, le=LARGEST_MIB, description="memory of a case")
-    slots: int | None = Key(default=None, ge=1, le=100_000, description="cases that fly at a time, as licences allow")
-    keep: Literal["none", "failed", "all"] = Key(default="failed", description="cases whose folders are kept")
-    deterministic: bool = Key(default=True, description="replay compares bits; false: numbers within tolerance")
-    tolerance: float = Key(default=0.0, ge=0.0, lt=1.0, description="fraction by which numbers may differ")
-    parameter: dict[str, ParameterSection] = Key(default_factory=dict, description="its inputs, a table each")
-    metric: dict[str, MetricSection] = Key(min_length=1, description="its results, a table each")
-    output: dict[str, NumberSection] = Key(default_factory=dict, description="columns of its history")
+    echo: str | None = Key(
+        default=None,
+        min_length=1,
+        description="path in the result at which the program returns the inputs that it used",
+    )
+    files: list[str] = Key(default_factory=list, description="further files beside this one that the program needs")
+    time_limit_s: float | None = Key(default=None, gt=0.0, le=LONGEST_S, description="a longer case ends as time-limit")
+    memory_limit_mib: float | None = Key(
+        default=None, gt=0.0, le=LARGEST_MIB, description="a larger case ends as memory-limit"
+    )
+    slots: int | None = Key(
+        default=None,
+        ge=1,
+        le=100_000,
+        description="most cases that fly at the same time, such as the number of licences",
+    )
+    keep: Literal["none", "failed", "all"] = Key(
+        default="failed", description="cases whose folders are kept in the run directory"
+    )
+    deterministic: bool = Key(
+        default=True, description="true: replay compares bits; false: numbers may differ by tolerance"
+    )
+    tolerance: float = Key(
+        default=0.0, ge=0.0, lt=1.0, description="largest relative difference of numbers in a replay"
+    )
+    parameter: dict[str, ParameterSection] = Key(default_factory=dict, description="the inputs, a table for each")
+    metric: dict[str, MetricSection] = Key(min_length=1, description="the results, a table for each")
+    output: dict[str, NumberSection] = Key(
+        default_factory=dict, description="columns of the time history, a table for each"
+    )
 
 
 @dataclass(frozen=True)
