@@ -1,4 +1,4 @@
-"""The commands on a run that is there: report, status, summary, verify, export, publish, fetch."""
+"""The commands on an existing run: report, status, summary, verify, export, publish, fetch."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 REPORT_FORMATS = ("html", "pdf", "md", "json")
 EXPORT_FORMATS = ("csv", "oem")
 _OEM_COLUMNS = 6
-Url = Annotated[str, typer.Argument(metavar="URL", help="Such as s3://bucket/runs/deorbit.", parser=object_store)]
+Url = Annotated[str, typer.Argument(metavar="URL", help="The copy, as s3://bucket/runs/deorbit.", parser=object_store)]
 
 
 @app.command()
@@ -55,7 +55,7 @@ def report(
     ] = None,
     template: Annotated[
         Path | None,
-        typer.Option(help="Markdown with Jinja expressions: sections of your own, before the others of each report."),
+        typer.Option(help="Markdown file with Jinja expressions: your own sections, placed first in each report."),
     ] = None,
 ) -> None:
     """Write the reports of runs, tunings or rare events anew."""
@@ -84,7 +84,7 @@ def report(
 @app.command()
 @exit_status()
 def status(place: RunPlace) -> None:
-    """How far a run is, and how its cases ended; of a tuning or a rare event, what was found."""
+    """Print the progress of a run and the statuses of its cases; for a tuning or a rare event, its result."""
     from mc_engine.runner.summary import case_line
     from mc_engine.store.case_rows import recorded_cases, rows_so_far
     from mc_engine.store.run_files import RARE_EVENT, TUNING, kind_of
@@ -134,7 +134,7 @@ def summary(
     place: RunPlace,
     metric: Annotated[list[str] | None, typer.Option(help="Only this metric; may be given several times.")] = None,
 ) -> None:
-    """Moments and quantiles of the metrics of a run of any size, read part by part."""
+    """Print moments and quantiles of the metrics of a run of any size; it is read part by part."""
     from mc_engine.runner.summary import summaries, summary_lines
     from mc_engine.section import ReportSection
     from mc_engine.statistics import SAMPLING_DESIGNS
@@ -182,17 +182,17 @@ def export(
         str,
         typer.Option(
             "--format",
-            help="csv, or oem (CCSDS ephemerides, a point a case).",
+            help="csv, or oem (CCSDS ephemerides, one point per case).",
             autocompletion=beginning(EXPORT_FORMATS),
         ),
     ] = "csv",
     columns: Annotated[
         str | None,
-        typer.Option(help="Columns with commas between; for oem those of x, y, z and their rates."),
+        typer.Option(help="Columns, separated by commas; for oem those of x, y, z and their rates."),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Where to write; by default end_states.csv or .oem in RUN.", parser=new_file),
+        typer.Option(metavar="FILE", help="Output file; by default end_states.csv or .oem in RUN.", parser=new_file),
     ] = None,
     epoch: Annotated[
         str | None, typer.Option(help="For oem: start of the flights in UTC; by default the setting epoch_utc.")
@@ -200,7 +200,7 @@ def export(
     frame: Annotated[str | None, typer.Option(help="For oem: reference frame of the columns, such as EME2000.")] = None,
     centre: Annotated[str | None, typer.Option(help="For oem: the body at the origin; by default EARTH.")] = None,
 ) -> None:
-    """Write where the cases ended, for other tools."""
+    """Write the end states of the cases to a file for other tools."""
     if kind not in EXPORT_FORMATS:
         leave(USAGE, f'--format "{kind}" is not known; {" or ".join(EXPORT_FORMATS)}')
     if out is None and is_url(place):
@@ -260,7 +260,7 @@ def _epoch_of(store: "Store") -> str | None:
 @app.command()
 @exit_status()
 def publish(folder: RunFolder, url: Url) -> None:
-    """Copy a run to an object store; only what is missing there or differs travels (needs fsspec, s3fs)."""
+    """Copy a run to an object store; only missing or different files are sent (needs fsspec, s3fs)."""
     advise(lambda: f"interrupted; `mc-engine publish {shell_word(folder)} {shell_word(url)}` sends the rest")
     existing_run(folder)
     echo_publication(folder, url)
@@ -285,7 +285,7 @@ def echo_publication(folder: Path, url: str) -> None:
 @app.command()
 @exit_status()
 def fetch(
-    url: Url, folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where the copy is to be.", parser=new_file)]
+    url: Url, folder: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of the copy.", parser=new_file)]
 ) -> None:
     """Copy a run from an object store to a new directory; the checksum of every part is verified."""
     from mc_engine.store.object_store import fetch

@@ -1,8 +1,8 @@
 """The application of the command line, and what its commands share: exit statuses, arguments, checks of paths.
 
 Exit status: 0 done, 1 a requirement is not met (`run --judge`) or something has changed (`compare`), 2 wrong usage or
-campaign, 3 more failed cases than allowed (`run --max-failed`), 4 interrupted or disk full, and resumable, 5 directory
-damaged or busy, a replay that differs, or object store out of reach, 6 unexpected error or too little memory, with a
+invalid campaign, 3 more failed cases than allowed (`run --max-failed`), 4 interrupted or disk full, can be resumed,
+5 directory damaged or busy, replay differs, or object store unreachable, 6 unexpected error or out of memory, with a
 log file.
 """
 
@@ -58,9 +58,9 @@ def _converted(kind: Any, value: Any, param: Any, ctx: Any) -> Any:
 app = typer.Typer(
     cls=_Commands,
     help="Monte Carlo dispersion campaigns for spacecraft guidance, navigation and control.",
-    epilog="Exit status: 0 done, 1 a requirement not met or a change found, 2 wrong usage or campaign, 3 too many "
-    "failed cases, 4 interrupted or disk full, 5 damaged or busy directory, or object store out of reach, 6 unforeseen "
-    "error or too little memory.",
+    epilog="Exit status: 0 done, 1 a requirement not met or a change found, 2 wrong usage or invalid campaign, 3 too "
+    "many failed cases, 4 interrupted or disk full, 5 directory damaged or busy, replay differs, or object store "
+    "unreachable, 6 unexpected error or out of memory.",
     no_args_is_help=True,
     rich_markup_mode=None,  # plain help: importing rich takes longer than all the rest
     pretty_exceptions_enable=False,
@@ -132,30 +132,30 @@ BackendName = Annotated[
     typer.Option(
         "--backend",
         metavar="NAME",
-        help="Who flies: threading, loky (processes), dask (a cluster), cuda (NVIDIA cards), auto.",
+        help="Where cases fly: threading, loky (processes), dask (a cluster), cuda (NVIDIA cards), auto.",
         autocompletion=beginning(("threading", "loky", "dask", "cuda", "auto")),
     ),
 ]
 Scheduler = Annotated[
-    str | None, typer.Option(metavar="ADDRESS", help="With dask: a scheduler such as tcp://node1:8786.")
+    str | None, typer.Option(metavar="ADDRESS", help="With dask: the scheduler, such as tcp://node1:8786.")
 ]
 CaseSeconds = Annotated[
-    float | None, typer.Option(min=0.1, max=1e8, help="With loky or dask: give a case up that takes longer.")
+    float | None, typer.Option(min=0.1, max=1e8, help="With loky or dask: give up a case that takes longer.")
 ]
 Memory = Annotated[
-    int | None, typer.Option(min=512, max=2**30, metavar="MIB", help="With loky or dask: memory of a worker.")
+    int | None, typer.Option(min=512, max=2**30, metavar="MIB", help="With loky or dask: most memory of a worker.")
 ]
 Patience = Annotated[
     float | None,
     typer.Option(
-        min=1.0, max=1e8, metavar="S", help="With dask: give up after so long without a worker; by default 300 s."
+        min=1.0, max=1e8, metavar="S", help="With dask: give up after this time without a worker; by default 300 s."
     ),
 ]
 Publish = Annotated[
     str | None,
-    typer.Option(metavar="URL", parser=object_store, help="Keep a copy, such as s3://bucket/x, up to date in flight."),
+    typer.Option(metavar="URL", parser=object_store, help="Update a copy, such as s3://bucket/x, during the run."),
 ]
-NoReport = Annotated[bool, typer.Option("--no-report", help="Leave the reports out.")]
+NoReport = Annotated[bool, typer.Option("--no-report", help="Write no reports.")]
 
 
 @contextmanager
@@ -259,7 +259,7 @@ def refuse_occupied_folder(path: Path, option: str = "--out ") -> None:
 
 
 def refuse_unwritable_folder(path: Path, option: str = "--out ") -> None:
-    """End the command if `path` is no folder that can be written to, and none can be made there."""
+    """End the command unless `path` is a writable folder, or one can be made there."""
     existing = next(folder for folder in (path, *path.absolute().parents) if os.path.lexists(folder))
     if not existing.exists():
         leave(USAGE, f"{option}{path}: {existing} is a symbolic link to {os.readlink(existing)}, which is not there")
@@ -268,7 +268,7 @@ def refuse_unwritable_folder(path: Path, option: str = "--out ") -> None:
 
 
 def refuse_unwritable_file(option: str, path: Path) -> None:
-    """End the command if no file can be made at `path`; called before the work that the file is to hold."""
+    """End the command if no file can be made at `path`; called before the work whose result it will hold."""
     if not path.parent.is_dir():
         leave(USAGE, f"{option} {path}: there is no folder {path.parent}")
     if path.is_dir():
@@ -291,7 +291,7 @@ def write_reports(path: Path, formats: tuple[str, ...], **options: Any) -> list[
 
 
 def echo_preparation(system: Any) -> None:
-    """Say that a model may have to be compiled; nothing of a simulator.
+    """Print that a model may have to be compiled; nothing for a simulator.
 
     system : a Model, a Simulator, or the folder of a run.
     """

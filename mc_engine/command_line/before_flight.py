@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 @app.command()
 @exit_status()
 def init(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where the new campaign is to be.", parser=new_file)],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of the new campaign.", parser=new_file)],
 ) -> None:
-    """Copy the smallest campaign, a model and its file, to DIR as a start for your own."""
+    """Copy a minimal campaign, its model and its campaign file, to DIR as a start for your own."""
     from mc_engine.campaign.search import SHIPPED
 
     names = ("campaign.toml", "model.py")
@@ -62,12 +62,12 @@ def init(
 @exit_status()
 def check(
     file: CampaignFile,
-    model: Annotated[bool, typer.Option(help="Hold the model to its contract too; flies a few cases.")] = True,
+    model: Annotated[bool, typer.Option(help="Check the model too, by flying a few cases.")] = True,
 ) -> None:
-    """Report everything that is wrong with a campaign file, and with its model.
+    """Report all errors in a campaign file and its model.
 
-    A few cases are flown in a process of their own: results must be there and be independent of the other cases in the
-    batch, and every declared dispersion, metric and event must matter.
+    A few cases are flown in a separate process.  All results must exist and not depend on the other cases in the batch,
+    every dispersion must have an effect, every metric must vary, and every event must happen.
     """
     with _flights_beside(file) if model else nullcontext() as process:
         campaign, flyer, problems = _checked(file, process)
@@ -85,9 +85,9 @@ def check(
 
 @contextmanager
 def _flights_beside(file: str) -> "Iterator[Process]":
-    """A process of its own, which the model may kill or hang: it loads a campaign and waits to fly a few cases.
+    """A separate process, as the model may crash or hang: it loads a campaign and waits to fly a few cases.
 
-    file : as the user named it.  The process loads what `check` loads meanwhile, and is killed at the end.
+    file : as the user named it.  The process loads the campaign while `check` does, and is killed at the end.
     """
     import subprocess
 
@@ -143,12 +143,12 @@ def _told_if_long(campaign: "Campaign") -> Iterator[None]:
 @exit_status()
 def plan(
     file: Annotated[
-        str | None, typer.Argument(metavar="[FILE_OR_NAME]", help="A campaign, for the requirements that it sets.")
+        str | None, typer.Argument(metavar="[FILE_OR_NAME]", help="A campaign, to plan for its requirements.")
     ] = None,
     share: Annotated[float | None, typer.Option(help="Success probability to be demonstrated, such as 0.9973.")] = None,
     confidence: Annotated[float | None, typer.Option(help="Confidence of the demonstration, such as 0.90.")] = None,
     failures: Annotated[
-        int | None, typer.Option(min=0, max=1_000_000, help="Only the row for this many failures.")
+        int | None, typer.Option(min=0, max=1_000_000, help="Print only the row for this number of failures.")
     ] = None,
     two_sided: Annotated[
         bool,
@@ -159,9 +159,9 @@ def plan(
         ),
     ] = False,
 ) -> None:
-    """How many cases demonstrate a success probability with a confidence, for 0, 1, 2, ... failures among them.
+    """Print the number of cases that demonstrates a success probability, with 0, 1, 2, ... failures among them.
 
-    Give --share and --confidence, or a campaign whose requirements are planned for, one by one and together.
+    Give --share and --confidence, or a campaign: then the table is for its requirements, one by one and together.
     """
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.studies.plan import ROWS, interval_lines, plan_lines, plan_row, table_lines
@@ -198,10 +198,10 @@ def sample(
     cases: Cases = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write the whole table here, .parquet or .csv.", parser=new_file),
+        typer.Option(metavar="FILE", help="File for the whole table, .parquet or .csv.", parser=new_file),
     ] = None,
 ) -> None:
-    """Draw the case table without flying it."""
+    """Print or write the inputs of all cases, without flying them."""
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.campaign.sample_table import SUFFIXES, drawn_inputs, sample_text, write_sample
 
@@ -221,7 +221,7 @@ def sample(
 @app.command("list")
 @exit_status()
 def list_() -> None:
-    """The shipped campaigns, by the names that `run` takes, and what they are after."""
+    """List the shipped campaigns: their names, as `run` takes them, and their titles."""
     from mc_engine.campaign.search import list_campaigns, model_sources
 
     campaigns, sources = list_campaigns(), model_sources()
@@ -236,7 +236,7 @@ def list_() -> None:
 @app.command()
 @exit_status()
 def schema() -> None:
-    """The JSON schema of campaign files, for an editor."""
+    """Print the JSON schema of campaign files, for an editor."""
     from mc_engine.campaign.sections import schema as campaign_schema
 
     typer.echo(json.dumps(campaign_schema(), indent=2, ensure_ascii=False))
@@ -245,7 +245,7 @@ def schema() -> None:
 @app.command()
 @exit_status()
 def units() -> None:
-    """All units that a model or a campaign file can name, by what they measure; the first of each is that of SI."""
+    """List all units for models and campaign files, by quantity; the first of each is the SI unit."""
     from mc_engine.units import OTHER_SUFFIXES, UNITS, by_quantity
 
     groups = by_quantity()

@@ -64,27 +64,27 @@ def run(
     memory: Memory = None,
     patience: Patience = None,
     shard: Annotated[
-        str | None, typer.Option(metavar="K/N", help="Fly the K-th of N pieces; `merge` joins the pieces.")
+        str | None, typer.Option(metavar="K/N", help="Fly shard K of N; `merge` joins the shards.")
     ] = None,
     upstream: Annotated[
         Path | None,
         typer.Option(
             "--from",
             metavar="RUN",
-            help="Run to take inputs from, in place of the one that [inputs] names.",
+            help="Run to take inputs from, in place of the one in [inputs].",
             parser=run_here,
         ),
     ] = None,
-    judge: Annotated[bool, typer.Option("--judge", help="Exit with 1 unless every requirement passes.")] = False,
+    judge: Annotated[bool, typer.Option("--judge", help="Exit with 1 unless all requirements are met.")] = False,
     max_failed: Annotated[int | None, typer.Option(min=0, help="Exit with 3 if more cases fail.")] = None,
     publish: Publish = None,
     until: Annotated[
         str | None,
-        typer.Option(help='"verdict": stop when every requirement passes or fails, at the number of cases at latest.'),
+        typer.Option(help='"verdict": stop as soon as all requirements are decided, at latest after all cases.'),
     ] = None,
     watch: Annotated[
         bool,
-        typer.Option("--watch", help="Fly 200 cases, or --cases, again on every saved change; redraw a page in --out."),
+        typer.Option("--watch", help="Fly 200 cases, or --cases, on every saved change; show a page in --out."),
     ] = False,
 ) -> None:
     """Fly a campaign and write its reports."""
@@ -145,7 +145,7 @@ def _worker_options(
 ) -> dict[str, Any]:
     """The runner's arguments on workers, from the options of a command.
 
-    From here on the message of an interruption names the command that continues the run in `folder`.
+    Afterwards the message of an interruption names the command that continues the run in `folder`.
     """
     from mc_engine.runner.backends import Backend
 
@@ -188,7 +188,7 @@ def _publisher(path: Path, url: str | None) -> Iterator[None]:
 def _with_progress(
     fly: Callable[[Any, Any], "Store"], system: Any, publisher: AbstractContextManager[Any] | None = None
 ) -> "Store":
-    """What `fly(runner, progress)` returns, with the progress shown and the run published during the flight."""
+    """The result of `fly(runner, progress)`; shows the progress and publishes the run during the flight."""
     from mc_engine.runner import runner
     from mc_engine.runner.progress import Progress
 
@@ -206,7 +206,7 @@ def finish(
     url: str | None = None,
     campaign: str | None = None,
 ) -> None:
-    """Write the reports of a run, print the summary, and set the exit status that --judge and --max-failed ask for."""
+    """Write the reports of a run, print the summary, and set the exit status according to --judge and --max-failed."""
     from mc_engine.runner.summary import (
         analyses_line,
         case_line,
@@ -279,7 +279,7 @@ def resume(
     case_seconds: CaseSeconds = None,
     memory: Memory = None,
     patience: Patience = None,
-    repair: Annotated[bool, typer.Option("--repair", help="Fly again what is damaged.")] = False,
+    repair: Annotated[bool, typer.Option("--repair", help="Fly the cases of damaged files again.")] = False,
     publish: Publish = None,
 ) -> None:
     """Complete a run that was interrupted."""
@@ -324,7 +324,7 @@ def _leave_complete(store: "Store", url: str | None) -> None:
 @exit_status()
 def extend(
     folder: RunFolder,
-    cases: Annotated[int, typer.Option(min=1, help="How many cases the run is to have in all.")],
+    cases: Annotated[int, typer.Option(min=1, help="New total number of cases.")],
     no_report: NoReport = False,
     workers: Workers = None,
     backend: BackendName = "threading",
@@ -334,7 +334,7 @@ def extend(
     patience: Patience = None,
     publish: Publish = None,
 ) -> None:
-    """Add cases to a run; 1000 extended to 2000 are the same as 2000 from the start."""
+    """Add cases to a run; a run of 1000 cases extended to 2000 equals a run of 2000 cases."""
     from mc_engine.sampling.designs import extension_problem
 
     _refuse_publication(publish)
@@ -352,7 +352,7 @@ def extend(
 @exit_status()
 def rerun(
     folder: RunFolder,
-    failed: Annotated[bool, typer.Option("--failed", help="The cases that did not complete.")] = False,
+    failed: Annotated[bool, typer.Option("--failed", help="Fly the failed cases; required.")] = False,
     no_report: NoReport = False,
     workers: Workers = None,
     backend: BackendName = "loky",
@@ -361,7 +361,7 @@ def rerun(
     memory: Memory = None,
     patience: Patience = None,
 ) -> None:
-    """Fly failed cases of a run again, in processes: their worker may have died of something outside."""
+    """Fly failed cases of a run again, in processes, for example after their worker was killed."""
     store = existing_run(folder)
     if not failed:
         leave(USAGE, "rerun flies only failed cases again: add --failed; the others would come out with the same bits")
@@ -378,17 +378,17 @@ def rerun(
 @app.command()
 @exit_status()
 def merge(
-    out: Annotated[Path, typer.Argument(metavar="RUN", help="Directory of the run to be made.", parser=new_folder)],
+    out: Annotated[Path, typer.Argument(metavar="RUN", help="Directory of the new run.", parser=new_folder)],
     shards: Annotated[
-        list[Path], typer.Argument(metavar="SHARD...", help="Directories of `run --shard`.", parser=run_here)
+        list[Path], typer.Argument(metavar="SHARD...", help="Directories made by `run --shard`.", parser=run_here)
     ],
     no_report: NoReport = False,
     chunk: Annotated[
-        int | None, typer.Option(min=1, max=MOST_CASES, help="Cases of a part; as `run` would have it by default.")
+        int | None, typer.Option(min=1, max=MOST_CASES, help="Cases in each file; by default as `run` does.")
     ] = None,
     workers: Workers = None,
 ) -> None:
-    """Make one run of the shards of a campaign: the same table as flown by one process."""
+    """Join the shards of a campaign into one run, with the same table as a run without shards."""
     for shard in shards:
         existing_run(shard)
     refuse_occupied_folder(out, option="")

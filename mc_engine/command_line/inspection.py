@@ -1,4 +1,4 @@
-"""The commands that look at one case: debug and replay."""
+"""The commands on a single case: debug and replay."""
 
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -43,15 +43,13 @@ def debug(
     ] = None,
     at_nan: Annotated[
         bool,
-        typer.Option(
-            "--at-nan", help="Stop at the line that breaks the flight with a number which is infinite or NaN."
-        ),
+        typer.Option("--at-nan", help="Stop at the line that ends the flight by a result that is infinite or NaN."),
     ] = False,
 ) -> None:
     """Fly one case by Python and stop in a debugger, inside the model's own functions.
 
-    Without an option it stops at the first line of rhs, at the start; where the physics has a breakpoint() or a print
-    of its own, there alone. The debugger is that of Python's breakpoint(): pdb, or what PYTHONBREAKPOINT names.
+    Without an option it stops at the first line of rhs, at the start. If the physics contains breakpoint() or print, it
+    stops only there. The debugger is that of Python's breakpoint(): pdb, or the one that PYTHONBREAKPOINT names.
     Without a terminal it reads its commands from standard input.
     """
     from bdb import BdbQuit
@@ -112,7 +110,7 @@ def _echo_end(who: str, ended: "Debugged", stop: "Stop | None") -> None:
 @app.command(context_settings={"ignore_unknown_options": True})
 @exit_status()
 def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE", min=0, help="Its case_id.")]) -> None:
-    """Fly one case again, alone: compare every stored number bit for bit, and write and plot its history.
+    """Fly one case again, compare every stored number bit for bit, and write and plot its time history.
 
     The numbers of a simulator that is not deterministic are compared within its tolerance.
     """

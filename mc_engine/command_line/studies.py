@@ -1,4 +1,4 @@
-"""The commands on several runs and beyond one: import, tune, rare, compare, published, bench."""
+"""The commands on several runs, and on results beyond one run: import, tune, rare, compare, published, bench."""
 
 import importlib
 import time
@@ -47,8 +47,8 @@ def import_(
     results: Annotated[
         Path, typer.Argument(metavar="FILE", help="Table of results, .parquet or .csv.", parser=new_file)
     ],
-    campaign: Annotated[str, typer.Option(metavar="FILE_OR_NAME", help="The campaign that the cases were flown for.")],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Directory of the run to be made.", parser=new_folder)],
+    campaign: Annotated[str, typer.Option(metavar="FILE_OR_NAME", help="The campaign of the cases.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Directory of the new run.", parser=new_folder)],
     history: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Table of time histories: case_id, t_s, outputs.", parser=new_file),
@@ -56,9 +56,9 @@ def import_(
     cases: Cases = None,
     no_report: NoReport = False,
 ) -> None:
-    """Make a run of results that were flown elsewhere: a table of case_id, inputs and metrics.
+    """Make a run from results computed elsewhere: a table of case_id, inputs and metrics.
 
-    The inputs are compared with those that `mc-engine sample` gives for the campaign.
+    The inputs must agree with those of `mc-engine sample` for the campaign.
     """
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.runner.importing import import_results
@@ -80,15 +80,15 @@ def tune(
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, max=2**32 - 1, help="Seed of the search.")] = None,
     generations: Annotated[
-        int | None, typer.Option(min=1, max=100_000, help="Generations, in place of the file's.")
+        int | None, typer.Option(min=1, max=100_000, help="Number of generations, in place of the file's.")
     ] = None,
     population: Annotated[
-        int | None, typer.Option(min=4, max=100_000, help="Candidates in each, in place of the file's.")
+        int | None, typer.Option(min=4, max=100_000, help="Candidates in a generation, in place of the file's.")
     ] = None,
     no_report: NoReport = False,
     workers: Workers = None,
 ) -> None:
-    """Search parameters for the best metrics, as the section tuning of FILE says (needs pymoo)."""
+    """Search for the parameters with the best metrics, as [tuning] of FILE specifies (needs pymoo)."""
     advise(lambda: NOTHING_BEGUN)
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.store.run_files import default_folder
@@ -118,12 +118,12 @@ def tune(
 @exit_status()
 def rare(
     file: CampaignFile,
-    requirement: Annotated[str | None, typer.Option(help="Its name; the only one by default.")] = None,
+    requirement: Annotated[str | None, typer.Option(help="Its name; not needed for a single one.")] = None,
     method: Annotated[
         str, typer.Option(help="subset or cross-entropy.", autocompletion=beginning(("subset", "cross-entropy")))
     ] = "subset",
     cases_per_level: Annotated[
-        int, typer.Option(min=_FEWEST_OF_LEVEL, max=10_000_000, help="Cases that each level stands on.")
+        int, typer.Option(min=_FEWEST_OF_LEVEL, max=10_000_000, help="Number of cases at each level.")
     ] = 10_000,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed, in place of the file's.")] = None,
     out: Annotated[
@@ -133,7 +133,7 @@ def rare(
     no_report: NoReport = False,
     workers: Workers = None,
 ) -> None:
-    """The probability that a requirement of FILE is not met, down to one in millions, with its interval."""
+    """Estimate the probability, down to one in millions, that a requirement of FILE is not met."""
     advise(lambda: NOTHING_BEGUN)
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.store.run_files import default_folder
@@ -164,7 +164,7 @@ def rare(
 
 
 def _echo_result(path: Path, lines: list[str], no_report: bool) -> None:
-    """The lines of a result; then its reports are written."""
+    """Print the lines of a result, and write its reports."""
     raise_if_signalled()
     for line in lines:
         typer.echo(line)
@@ -187,22 +187,22 @@ class _ProgressLines:
 @app.command()
 @exit_status()
 def compare(
-    before: Annotated[str, typer.Argument(metavar="A", help="The directory or URL of the run before.")],
-    after: Annotated[str, typer.Argument(metavar="B", help="The directory or URL of the run after.")],
+    before: Annotated[str, typer.Argument(metavar="A", help="Directory or URL of the run before the change.")],
+    after: Annotated[str, typer.Argument(metavar="B", help="Directory or URL of the run after the change.")],
     alpha: Annotated[
-        float, typer.Option(help="Chance of even one false alarm in all tests together, above 0, below 1.")
+        float, typer.Option(help="Probability of one or more false alarms in all tests together, above 0, below 1.")
     ] = 0.003,
     tolerance: Annotated[
-        float, typer.Option(min=0.0, help="Standard deviations; smaller differences of a pair are rounding.")
+        float, typer.Option(min=0.0, help="Smaller differences of a pair, in standard deviations, are ignored.")
     ] = 1e-6,
     report: Annotated[
         list[Path] | None,
         typer.Option(
-            metavar="FILE", help="Where to write the comparison, .html or .pdf; may be given twice.", parser=new_file
+            metavar="FILE", help="File for the comparison, .html or .pdf; may be given twice.", parser=new_file
         ),
     ] = None,
 ) -> None:
-    """What changed from run A to run B beyond chance.
+    """Test which results changed significantly from run A to run B.
 
     Exit status 0: no significant change; 1: a metric or a fraction of cases changed, or a requirement has a
     worse verdict on the same cases.
@@ -232,30 +232,30 @@ def compare(
 @exit_status()
 def published(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="[NAME]...", help="Campaigns, for all values of their sources.")
+        list[str] | None, typer.Argument(metavar="[NAME]...", help="Campaigns whose values are all listed.")
     ] = None,
     compute: Annotated[
-        bool, typer.Option("--compute", help="Compute our values anew; runs code of the campaigns.")
+        bool, typer.Option("--compute", help="Compute the values anew; runs code of the campaigns.")
     ] = False,
     no_slow: Annotated[
-        bool, typer.Option("--no-slow", help="With --compute: take the kept values of the slow records.")
+        bool, typer.Option("--no-slow", help="With --compute: use the stored values of slow records.")
     ] = False,
     update_lock: Annotated[
-        bool, typer.Option("--update-lock", help="With --compute: keep the values, in published.lock.toml.")
+        bool, typer.Option("--update-lock", help="With --compute: store the values in published.lock.toml.")
     ] = False,
     write: Annotated[
         Path | None,
         typer.Option(
             parser=new_file,
             metavar="FILE",
-            help="Put it into a Markdown file, between <!-- published --> and <!-- end -->.",
+            help="Markdown file to insert it into, between <!-- published --> and <!-- end -->.",
         ),
     ] = None,
 ) -> None:
-    """Published values beside ours, as Markdown, each with its outcome: reached, close, improved, not reached, unknown.
+    """Compare published values with ours, as Markdown; outcomes: reached, close, improved, not reached, unknown.
 
-    Without a name: how many there are of each in the shipped campaigns, and the headline numbers.  Ours are the kept
-    values of `published.lock.toml` unless --compute is given.
+    Without a name: the number of each outcome in the shipped campaigns, and the headline numbers.  Our values are read
+    from `published.lock.toml`, unless --compute is given.
     """
     from mc_engine.durable_file import write_durably
     from mc_engine.studies.published_table import (
@@ -282,7 +282,7 @@ def published(
 
 
 def _computed(path: Path, slow: bool, update_lock: bool) -> dict[str, float | str]:
-    """Our values, computed now; says on stderr which differ from the kept ones."""
+    """Our values, computed now; prints on stderr which differ from the stored ones."""
     advise(lambda: NOTHING_BEGUN)
     from mc_engine.studies.published import differing, kept_values, read_published
     from mc_engine.studies.published_values import computed_values, write_lock
@@ -312,22 +312,23 @@ def bench(
     file: CampaignFile,
     cases: Annotated[
         int | None,
-        typer.Option(min=1, max=10_000_000, help="Cases of a flight; by default those of a short time."),
+        typer.Option(min=1, max=10_000_000, help="Cases in each flight; by default as many as take a short time."),
     ] = None,
     repeats: Annotated[
-        int, typer.Option(min=1, max=10_000, help="Flights of each build; the fastest counts.")
+        int, typer.Option(min=1, max=10_000, help="Flights per measurement; the fastest counts.")
     ] = _REPEATS,
     methods: Annotated[
-        bool, typer.Option("--methods", help="Which integration method is fastest at the error of the model's own.")
+        bool, typer.Option("--methods", help="Find the fastest integration method with the error of the model's own.")
     ] = False,
     card: Annotated[
-        bool, typer.Option("--card", help="On the cards and all cores of this machine; --backend auto goes by it.")
+        bool,
+        typer.Option("--card", help="Measure cards and all cores of this machine; --backend auto uses the result."),
     ] = False,
 ) -> None:
-    """How fast a campaign flies on one thread, and how much faster its cases fly side by side than one at a time.
+    """Measure the speed of a campaign on one thread, and the gain by SIMD batches over one case at a time.
 
-    With --methods: every method with the longest step, or roughest tolerance, whose error is that of the model's own
-    method. Only the flights are timed: compiling, sampling and storing are not. Nothing is stored.
+    With --methods, every method is timed with the longest step, or the loosest tolerance, at which its error is that of
+    the model's own method. Only flights are timed, not compiling, sampling and storing. Nothing is stored.
     """
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.flight.kernel import registers, usual_width

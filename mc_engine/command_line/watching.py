@@ -1,8 +1,8 @@
-"""`mc-engine run --watch`: flies a campaign again on every saved change, and redraws one page.
+"""`mc-engine run --watch`: flies a campaign again on every saved change, and updates a page with its report.
 
-Each flight is a process of its own, so that a mistake of a model, whatever it does, ends that flight and no more.  The
-page is a file that a browser opens by itself: it holds the latest report, and looks every second into a small file
-beside it that says what there is to show.
+Each flight is a separate process, so that an error in a model ends only that flight.  The page is a file, which the
+browser can open without a server: it shows the latest report, and reads a small file next to it every second for
+changes.
 """
 
 import json
@@ -104,14 +104,14 @@ def watch_campaign(reference: str, folder: Path | None, context: typer.Context) 
 
 
 def _options_given(context: typer.Context) -> dict[str, str]:
-    """The options of the command that are not as by default, but those of watching itself."""
+    """The options of the command that differ from their defaults, without those of watching itself."""
     given = {param.opts[0]: (context.params[str(param.name)], param.default) for param in context.command.params}
     own = ("file", "--watch", "--out")
     return {name: str(value) for name, (value, usual) in given.items() if value != usual and name not in own}
 
 
 def _fly_once(file: Path, arguments: Sequence[str], page: "_Page", seen: dict[Path, tuple[int, int]]) -> None:
-    """Fly once and show what came of it; given up if a file is saved before the flight has ended."""
+    """Fly once and show the result; given up if a file is saved before the flight has ended."""
     begun = time.monotonic()
     with TemporaryDirectory(prefix="mc-engine-watch-") as place:
         run = Path(place) / "run"
@@ -157,7 +157,7 @@ def _end(flight: "subprocess.Popen[str]") -> None:
 
 
 def _stamps(file: Path) -> dict[Path, tuple[int, int]]:
-    """Time of the last change [ns] and size of every file that may decide the results, by path."""
+    """Time of the last change [ns] and size of every file on which the results may depend, by path."""
     stamps: dict[Path, tuple[int, int]] = {}
     for folder in _folders(file):
         for path in _files_in(folder):
@@ -170,7 +170,7 @@ def _stamps(file: Path) -> dict[Path, tuple[int, int]]:
 
 
 def _folders(file: Path) -> list[Path]:
-    """The folder of the campaign file, and that of the model where it lies elsewhere."""
+    """The folder of the campaign file, and that of the model if it is another one."""
     home = file.absolute().parent
     model = campaign_section(file).get("model")
     if not isinstance(model, str):
@@ -213,7 +213,7 @@ class _Page:
         self._say(line, "")
 
     def complain(self, line: str, mistake: str) -> None:
-        """Show a mistake above the latest report, which is of what was before."""
+        """Show an error above the latest report, which is that of the last successful flight."""
         before = "; below, the results before the mistake" if self._report >= 0 else ""
         self._say(f"{line}{before}", mistake)
 
