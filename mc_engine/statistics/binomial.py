@@ -4,10 +4,10 @@ Valid for independent cases drawn from the dispersions (design `mc`).  For `lhs`
 fraction is smaller than binomial, so the bounds are conservative; for `grid` and `one_at_a_time` a fraction of cases is
 no probability and none of this applies.  Where the number of cases was decided by looking at them, use `time_uniform`.
 
-k of N: with at most k failures among N cases a probability is demonstrated.  The same numbers are those of
-distribution-free tolerance limits (Wilks, Ann. Math. Statist. 12 (1941), 91-96): the (k + 1)-th largest of N values is
-an upper tolerance limit, and the interval between two order statistics that leaves r values out at each end, those two
-among them, takes as many cases as 2 r - 1 failures.
+k of N: a probability is demonstrated by N cases with at most k failures.  The same numbers apply to distribution-free
+tolerance limits (Wilks, Ann. Math. Statist. 12 (1941), 91-96): the (k + 1)-th largest of N values is an upper tolerance
+limit.  The interval from the r-th smallest to the r-th largest value needs as many cases as a demonstration with
+2 r - 1 failures.
 
 Clopper & Pearson, Biometrika 26 (1934), 404-413.
 """
@@ -26,9 +26,9 @@ def lower_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
     tried : int, number of independent cases, fixed in advance
     confidence : float in (0, 1)
 
-    Returns a float in [0, 1]; 0.0 when nothing passed or nothing was tried.
+    Returns a float in [0, 1]; 0.0 if no case passed or none was tried.
 
-    Raises ValueError for counts that are not possible, or a confidence outside (0, 1).
+    Raises ValueError for impossible counts, or a confidence outside (0, 1).
 
     >>> round(lower_bound(2302, 2302), 4)
     0.999
@@ -44,9 +44,9 @@ def upper_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
     tried : int, number of independent cases, fixed in advance
     confidence : float in (0, 1)
 
-    Returns a float in [0, 1]; 1.0 when all passed or nothing was tried.
+    Returns a float in [0, 1]; 1.0 if all cases passed or none was tried.
 
-    Raises ValueError for counts that are not possible, or a confidence outside (0, 1).
+    Raises ValueError for impossible counts, or a confidence outside (0, 1).
 
     >>> round(upper_bound(90, 100), 3)
     0.937
@@ -64,7 +64,7 @@ def clopper_pearson(count: int, tried: int, confidence: float = 0.95) -> tuple[f
 
     Returns (lower, upper).
 
-    Raises ValueError for counts that are not possible, or a confidence outside (0, 1).
+    Raises ValueError for impossible counts, or a confidence outside (0, 1).
 
     Clopper & Pearson, Biometrika 26 (1934), 404-413.
 
@@ -83,9 +83,9 @@ def pass_probability(passed: int, tried: int, confidence: float = 0.90) -> tuple
     tried : int, above 0; failed cases count as tried
     confidence : float in (0, 1)
 
-    Returns (estimate, lower).  With nothing failed, lower = (1 - confidence)**(1/tried).
+    Returns (estimate, lower).  Without a failure, lower = (1 - confidence)**(1/tried).
 
-    Raises ValueError for counts that are not possible, or a confidence outside (0, 1).
+    Raises ValueError for impossible counts, or a confidence outside (0, 1).
 
     Clopper & Pearson, Biometrika 26 (1934), 404-413.
 
@@ -99,10 +99,10 @@ def pass_probability(passed: int, tried: int, confidence: float = 0.90) -> tuple
 
 
 def pass_chance(tried: int, accepted: int | None, true_share: float) -> float:
-    """Probability that at most `accepted` of `tried` cases fail when the true passing share is `true_share`.
+    """Probability that at most `accepted` of `tried` cases fail when the true success probability is `true_share`.
 
-    At the wanted share it is the consumer's risk, above it one less the producer's.  accepted None: 0.
-    Hanson & Beard, NASA/TP-2010-216447, section 4.
+    At the required probability this is the consumer's risk; above it, 1 minus the producer's risk.  0 if accepted is
+    None.  Hanson & Beard, NASA/TP-2010-216447, section 4.
     """
     if accepted is None:
         return 0.0
@@ -111,9 +111,9 @@ def pass_chance(tried: int, accepted: int | None, true_share: float) -> float:
 
 
 def smallest_sample(share: float, confidence: float, failures: int = 0) -> int:
-    """Smallest number of cases in which `failures` failures still demonstrate `share` with `confidence`.
+    """Smallest number of cases that demonstrates the success probability `share` with `confidence`, given `failures`.
 
-    share, confidence : in (0, 1), else ValueError.  failures : not negative.
+    share, confidence : in (0, 1), else ValueError.  failures : number of failures, not negative.
     """
     for name, value in (("share", share), ("confidence", confidence)):
         if not 0.0 < value < 1.0:
@@ -126,7 +126,7 @@ def smallest_sample(share: float, confidence: float, failures: int = 0) -> int:
 def smallest_interval_sample(share: float, confidence: float, left_out: int = 1) -> int:
     """Smallest number of cases whose `left_out`-th smallest and largest values enclose `share` of all cases.
 
-    left_out : from 1, the rank of the two limits, counted from either end.  With 1, smallest and largest value.
+    left_out : rank of the two limits, counted from either end; 1 for the smallest and the largest value.
     Wilks, Ann. Math. Statist. 12 (1941), 91-96: 93 for 95 % with 95 % confidence.
     """
     if left_out < 1:
@@ -135,12 +135,12 @@ def smallest_interval_sample(share: float, confidence: float, left_out: int = 1)
 
 
 def acceptance_number(tried: int, share: float, confidence: float) -> int | None:
-    """The most failures among `tried` cases that still show `share`; None if even none at all would not do."""
+    """The most failures among `tried` cases that still demonstrate `share`; None if zero failures do not."""
     return most_failures(lambda failures: _demonstrates(tried, share, confidence, failures), tried)
 
 
 def fewest_cases(demonstrates: Callable[[int], bool], failures: int) -> int:
-    """The smallest number of cases above `failures` that demonstrates, and all larger ones with it."""
+    """The smallest number of cases above `failures` at which, and above which, `demonstrates(cases)` is true."""
     enough = failures + 1
     while not demonstrates(enough):
         enough *= 2
@@ -148,13 +148,13 @@ def fewest_cases(demonstrates: Callable[[int], bool], failures: int) -> int:
 
 
 def most_failures(demonstrates: Callable[[int], bool], tried: int) -> int | None:
-    """The largest number of failures below `tried` that demonstrates, and all smaller ones with it; None if none."""
+    """The largest number below `tried` at which, and below which, `demonstrates(failures)` is true; None if none."""
     too_many = bisect_left(range(tried), True, key=lambda failures: not demonstrates(failures))
     return too_many - 1 if too_many else None
 
 
 def _demonstrates(cases: int, share: float, confidence: float, failures: int) -> bool:
-    """True if so few failures would be too lucky, had the success probability been just below `share`."""
+    """True if so few failures are improbable, at most 1 - confidence, for a success probability just below `share`."""
     # betainc(n - k, k + 1, p) is the binomial chance of at most k failures when each case succeeds with p.
     return bool(scipy.special.betainc(cases - failures, failures + 1, share) <= 1.0 - confidence)
 
@@ -165,7 +165,7 @@ def half_rate_share(share: float) -> float:
 
 
 def hypergeometric_tails(total: int, marked: int, drawn: int, count: int) -> tuple[float, float]:
-    """Probabilities of at most, and of at least, `count` marked ones among `drawn` of `total`, of which some are."""
+    """Probabilities of at most, and of at least, `count` marked items among `drawn` of `total` with `marked` marked."""
     k = np.arange(max(0, drawn - (total - marked)), min(marked, drawn) + 1)
     chance = -scipy.special.gammaln(k + 1.0) - scipy.special.gammaln(marked - k + 1.0)
     chance -= scipy.special.gammaln(drawn - k + 1.0) + scipy.special.gammaln(total - marked - drawn + k + 1.0)

@@ -1,4 +1,4 @@
-"""Has a metric changed between two runs?  Tests of shift, of spread and of shares, with the size of each change.
+"""Tests whether a metric changed between two runs: shift, spread and fractions of cases, with the size of each change.
 
 Paired (the same case in both runs, a row each)
     shift    Wilcoxon's signed ranks of the differences
@@ -9,16 +9,16 @@ Unpaired
     spread   Brown & Forsythe: analysis of variance of the distances to each run's own median
     share    Fisher's exact test
 
-Those of shifts and shares hold for any shape of distribution.  Those of spread are approximate.  They are of means of
-the distances, not of their ranks: an error of the median shifts the ranks of long one-sided tails, but the mean only to
-second order.  Where one run is far smaller than the other, long tails still give too many false alarms, at 0.003 of a
-log-normal with sigma 1.5 five times with 20 cases against 200; elsewhere they give fewer than stated.  All assume that
-the cases are independent of each other, so for `lhs` and `sobol` they are on the safe side.
+The tests of shifts and fractions hold for any distribution.  Those of spread are approximate.  They use means of the
+distances, not their ranks: an error of the median shifts the ranks of long one-sided tails, but the mean only to second
+order.  If one run is far smaller than the other, long tails still give too many false alarms: five times the level
+0.003 for a log-normal with sigma 1.5 and 20 cases against 200.  Elsewhere they give fewer than stated.  All tests
+assume independent cases, so for `lhs` and `sobol` they are conservative.
 
-The size of a change is of the same quantity as its test: the shift, or the ratio of the spreads, that the test does not
-tell from none at all, and as its interval all those that it does not reject (Hodges & Lehmann, Ann. Math. Stat. 34
-(1963), 598-611); a difference of shares has an interval of its own.  Intervals are not widened for their number.  Of
-pairs, shifts are of those that differ.  Of more than `MOST_CASES` numbers so many are tested, picked evenly.
+The size of a change is the shift, or the ratio of spreads, for which the test statistic is zero.  Its interval contains
+all values that the test does not reject (Hodges & Lehmann, Ann. Math. Stat. 34 (1963), 598-611).  A difference of
+fractions has its own interval.  Intervals are not widened for the number of comparisons.  For pairs, shifts are those
+of the pairs that differ.  Of more than `MOST_CASES` numbers, that many are tested, selected evenly.
 
 Wilcoxon, Biometrics Bull. 1 (1945), 80-83; Wilcox, Psychometrika 54 (1989), 305-315 (spread of pairs by distances);
 van der Waerden, Indag. Math. 14 (1952), 453-458; Chernoff & Savage, Ann. Math. Stat. 29 (1958), 972-994 (its power);
@@ -54,7 +54,7 @@ class Estimate:
 
     @property
     def unbounded(self) -> bool:
-        """Whether the cases, or the pairs that differ, are too few for either end of the interval."""
+        """Whether the cases, or the pairs that differ, are too few for an end of the interval."""
         return self.lower == -inf and self.upper == inf
 
     @property
@@ -70,11 +70,11 @@ UNKNOWN = Estimate(np.nan, np.nan, np.nan)
 
 @dataclass(frozen=True)
 class MetricChange:
-    """One metric in two runs.  n_used of n_tried cases have a number, by run; of a paired one, in both runs.
+    """One metric in two runs.  n_used of n_tried cases have a number, by run; if paired, in both runs.
 
-    differing : of a pair's two numbers, how many pairs differ by more than the tolerance; None if unpaired.
+    differing : number of pairs whose numbers differ by more than the tolerance; None if unpaired.
     mean, deviation : by run.  shift : from A to B, in the metric's unit.  ratio : spread of B over that of A, both as
-    tested.  shift_p, spread_p : p-values, NaN where there is nothing to test; adjusted ones by Holm.
+    tested.  shift_p, spread_p : p-values, NaN where nothing can be tested; Holm's adjusted ones.
     """
 
     metric: str
@@ -99,7 +99,7 @@ class MetricChange:
 
     @property
     def effect(self) -> float:
-        """How large the change is: of the shift in sigma and the logarithm of the ratio the larger one."""
+        """Size of the change: the larger of the shift in sigma and the logarithm of the ratio."""
         unscaled = inf if abs(self.shift.value) > 0.0 else 0.0  # run A has no spread
         shift = abs(self.shift_in_sigma.value) if finite(self.shift_in_sigma) else unscaled
         return max(shift, abs(log(self.ratio.value)) if self.ratio.value > 0.0 else 0.0)
@@ -115,7 +115,7 @@ class MetricChange:
 
 @dataclass(frozen=True)
 class ShareChange:
-    """A share of the cases in two runs: counted of tried, by run.  lost, gained : pairs counted in A only, B only."""
+    """A fraction of cases in two runs: counted of tried, by run.  lost, gained : pairs counted in A only, B only."""
 
     name: str
     counted: tuple[int, int]
@@ -130,7 +130,7 @@ class ShareChange:
 def metric_change(
     metric: str, a: np.ndarray, b: np.ndarray, *, paired: bool, confidence: float = 0.95, tolerance: float = 1e-6
 ) -> MetricChange:
-    """The change of one metric.  a, b : float64[n], NaN for a case without a number; paired row by row if so said.
+    """The change of one metric.  a, b : float64[n], NaN for a case without a number; with `paired`, row by row.
 
     tolerance : a pair whose numbers differ by no more than that many standard deviations of A counts as equal.
     """
@@ -172,7 +172,7 @@ def metric_change(
 
 
 def share_change(name: str, a: np.ndarray, b: np.ndarray, *, paired: bool, confidence: float = 0.95) -> ShareChange:
-    """The change of a share.  a, b : bool[n], whether a case counts; paired row by row if so said."""
+    """The change of a fraction of cases.  a, b : bool[n], whether a case counts; with `paired`, row by row."""
     counted, tried = (int(a.sum()), int(b.sum())), (a.size, b.size)
     if not a.size or not b.size:
         return ShareChange(name, counted, tried, UNKNOWN, np.nan)
@@ -186,9 +186,9 @@ def share_change(name: str, a: np.ndarray, b: np.ndarray, *, paired: bool, confi
 
 
 def holm(p_values: Sequence[float]) -> np.ndarray:
-    """Adjusted p-values: those at most alpha hold together with a chance of at most alpha of one being false.
+    """Adjusted p-values: the probability of any false alarm among those at most alpha is at most alpha.
 
-    A NaN is no test and stays one.  Holm, Scand. J. Stat. 6 (1979), 65-70.
+    NaN, for which there was no test, stays NaN.  Holm, Scand. J. Stat. 6 (1979), 65-70.
     """
     p = np.asarray(p_values, dtype=np.float64)
     adjusted = np.full(p.size, np.nan)
@@ -327,5 +327,5 @@ def finite(estimate: Estimate) -> bool:
 
 
 def hidden_by_ties(estimate: Estimate, unchanged: float, significant: bool) -> bool:
-    """Whether so many cases have equal values that the size of a significant change, with its interval, is none."""
+    """Whether ties are so frequent that the estimated size of a significant change, with its interval, is no change."""
     return significant and all(end == unchanged for end in astuple(estimate))

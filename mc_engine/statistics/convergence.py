@@ -1,16 +1,16 @@
 """Running estimates: how a mean or quantile develops with the number of cases, and whether it has converged.
 
-An estimate from all cases has converged if all of these hold:
+An estimate from all cases has converged if all of these conditions are met:
 - its interval reaches no farther from it than a stated part of the metric's standard deviation (`CLOSE_MEAN`,
   `CLOSE_QUANTILE`), so that more cases cannot change it much;
 - the first and the second half of the cases differ no more than by chance (`DRIFT`), so that it does not drift with the
-  case number, which independent cases never do;
+  case number, as is true for independent cases;
 - a mean is not that of a few extreme cases: the mean of |x - mean|³, in units of σ³, is at most 0.2 √n.  This ratio
   bounds the error of a normal interval (Berry and Esseen: Feller, An Introduction to Probability Theory, vol. 2, 2nd
   ed., XVI.5); as a rule of thumb it is Cochran's n > 25 γ₁² (Sampling Techniques, 3rd ed., 2.15) for either side.
 
-The order is that of the case numbers.  The first n cases of `lhs` are no Latin hypercube of n: their intervals, those
-of independent draws, are conservative.
+The cases are in the order of their numbers.  The first n cases of `lhs` are not a Latin hypercube of n cases; their
+intervals are those of independent draws, which is conservative.
 """
 
 from dataclasses import dataclass
@@ -32,12 +32,12 @@ SMALLEST_SHARE = 0.005  # of the cases, at the first place
 
 @dataclass(frozen=True)
 class RunningEstimate:
-    """An estimate from the first n cases with its two-sided interval, float64[k] each; NaN for a limit beyond reach.
+    """An estimate from the first n cases with its two-sided interval, float64[k] each; NaN: too few for a limit.
 
     probability : of a quantile; None for the mean.  cases : int64[k], tried so far.  n_used of n_tried have a number.
-    reach : of the last interval from the estimate, in standard deviations; None where it has an open end.
-    halves_p : probability of a difference like that of the two halves, or a larger one, by chance alone.
-    tails : of the cases behind a mean, their mean |x - mean|³ over σ³ √n; 0 for a quantile, whose interval is exact.
+    reach : distance of the last interval's ends from the estimate, in standard deviations; None with an open end.
+    halves_p : probability of a difference at least as large as that of the two halves by chance alone.
+    tails : for a mean, the mean |x - mean|³ over σ³ √n; 0 for a quantile, whose interval is exact.
     """
 
     probability: float | None
@@ -64,9 +64,9 @@ class RunningEstimate:
 
     @property
     def cases_wanted(self) -> int | None:
-        """About how many cases would make the interval close enough: it shrinks with their square root.
+        """Approximate number of cases with a sufficiently narrow interval: the width falls with their square root.
 
-        None where it is close enough, or has an open end.
+        None if the interval is narrow enough, or has an open end.
         """
         if self.reach is None or self.reach <= self.close:
             return None
@@ -74,7 +74,7 @@ class RunningEstimate:
 
 
 def running_mean(values: np.ndarray, confidence: float = 0.90) -> RunningEstimate | None:
-    """The mean of the first n of float64[n_tried], in the order of the cases, with Student's interval.
+    """The running mean of float64[n_tried], in the order of the cases, with Student's interval.
 
     None for fewer than 20 numbers, or a constant.
     """
@@ -107,9 +107,9 @@ def running_mean(values: np.ndarray, confidence: float = 0.90) -> RunningEstimat
 
 
 def running_quantile(values: np.ndarray, probability: float, confidence: float = 0.90) -> RunningEstimate | None:
-    """A quantile of the first n of float64[n_tried] with its distribution-free interval; None as for the mean.
+    """A running quantile of float64[n_tried] with its distribution-free interval; None as for the mean.
 
-    The halves are compared by how many of each lie above the quantile of all (Fisher's exact test).
+    The halves are compared by the number of cases in each above the quantile of all (Fisher's exact test).
     """
     cases, used = _sampled_counts(values)
     finite = _numbers(values)
@@ -138,7 +138,7 @@ def _numbers(values: np.ndarray) -> np.ndarray | None:
 
 
 def _sampled_counts(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of cases at which the estimate is looked at, evenly in their logarithm, and how many have a number."""
+    """Numbers of cases at which the estimate is computed, evenly in their logarithm, and how many have a number."""
     numbers = np.isfinite(values).cumsum()
     if not numbers.size or numbers[-1] < FEWEST:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)

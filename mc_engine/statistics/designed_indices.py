@@ -1,7 +1,7 @@
 """Sobol' indices from Saltelli's blocks and elementary effects from Morris's trajectories, analysed by SALib.
 
-A block, or trajectory, with a case that has no number is left out as a whole: its other cases mean nothing without it.
-Blocks that fail are not a random choice of all; where many do, the indices speak of the part that flies.
+A block or trajectory in which a case has no number is left out as a whole, because its other cases are of no use alone.
+Such blocks are not a random selection; if there are many, the indices describe only the cases that complete.
 
 Herman & Usher, J. Open Source Softw. 2 (2017) 97 (SALib); Saltelli et al., Comput. Phys. Commun. 181 (2010), 259-270;
 Campolongo, Cariboni & Saltelli, Environ. Model. Softw. 22 (2007), 1509-1518 (mu*).
@@ -24,12 +24,12 @@ _SEED = 1  # of the bootstrap behind the intervals: the same cases give the same
 
 @dataclass(frozen=True)
 class DesignedIndices:
-    """Indices by name, float64[n_inputs, n_metrics], NaN where a metric has none; `reach` their half intervals.
+    """Indices by name, float64[n_inputs, n_metrics], NaN where undefined; `reach` : half widths of their intervals.
 
-    Saltelli: "first_order" and "total", shares of the metric's variance.  Morris: "mu_star", "mu" and "sigma", mean
-    size, mean and standard deviation of the metric's change, per step of half the levels, divided by that step as a
-    share of the range between the outer levels (2/3).
-    n_used : int64[n_metrics], whole blocks with a number, of n_tried.
+    Saltelli: "first_order" and "total", fractions of the metric's variance.  Morris: "mu_star", "mu" and "sigma", mean
+    size, mean and standard deviation of the metric's change in a step of half the levels, divided by the step as a
+    fraction of the range between the outer levels (2/3).
+    n_used : int64[n_metrics], complete blocks with numbers, of n_tried.
     """
 
     design: str

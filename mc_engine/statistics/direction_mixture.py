@@ -1,11 +1,11 @@
 """Densities for importance sampling in standard normal space: mixtures over directions and distances.
 
 One component draws a direction about a mean direction (von Mises-Fisher) and a distance from a chi distribution, whose
-degrees of freedom nu need not be the number of inputs.  Separate directions and distances are what works for many
-inputs: Wang & Song, Structural Safety 59 (2016), 42-52; Papaioannou, Geyer & Straub, Reliability Engineering & System
-Safety 191 (2019) 106564, who take a Nakagami distribution of two parameters for the distance.  Fitted to failures that
-distribution is narrow, and the weights far out have no finite variance; a chi distribution with nu >= n_inputs, its
-case m = Omega / 2, keeps them bounded.
+degrees of freedom nu may differ from the number of inputs.  Separate directions and distances work for many inputs:
+Wang & Song, Structural Safety 59 (2016), 42-52; Papaioannou, Geyer & Straub, Reliability Engineering & System Safety
+191 (2019) 106564, who use a Nakagami distribution with two parameters for the distance.  Fitted to failures that
+distribution is narrow, and weights at large distances have no finite variance.  A chi distribution with nu >= n_inputs,
+its special case m = Omega / 2, keeps them bounded.
 """
 
 import math
@@ -26,9 +26,9 @@ _ASYMPTOTIC = 50.0  # orders of the Bessel function from which its expansion ser
 
 @dataclass(frozen=True)
 class DirectionMixture:
-    """share float64[k], adding up to 1; mean float64[k, n_inputs] of length 1; kappa, nu float64[k].
+    """A mixture: share float64[k], summing to 1; mean direction float64[k, n_inputs] of length 1; kappa, nu float64[k].
 
-    kappa = 0 : all directions alike.
+    kappa = 0 : all directions are equally probable.
     """
 
     share: np.ndarray
@@ -42,7 +42,7 @@ class DirectionMixture:
         return _added(component_logs(distance, direction, self))
 
     def draw(self, rng: np.random.Generator, n: int) -> np.ndarray:
-        """float64[n, n_inputs]."""
+        """float64[n, n_inputs]: n random points of the mixture."""
         counts = rng.multinomial(n, self.share)
         return np.concatenate([self._drawn(rng, int(count), place) for place, count in enumerate(counts) if count])
 
@@ -106,7 +106,7 @@ def log_sphere_factor(n_inputs: int, kappa: np.ndarray) -> np.ndarray:
 def fit_mixture(u: np.ndarray, weight: np.ndarray, rng: np.random.Generator) -> DirectionMixture:
     """The mixture nearest to weighted cases (in cross entropy), with as many components as they support.
 
-    The number is that of the least Bayes information criterion; one more is tried until two in a row are no better.
+    Their number minimises the Bayesian information criterion; it is increased until two in a row are no better.
     """
     order = np.argsort(weight, kind="stable")[::-1]
     carried = np.cumsum(weight[order])

@@ -1,17 +1,17 @@
 """Which inputs, and which pairs of them, separate the failed cases from the passed ones.
 
-For a number, two rank tests: are failed cases at one end of its range, or at both ends (or in the middle).  For a word
-or a switch: does a level hold more than its share of the failed cases.  For a pair: does the product of the two rank
-scores explain failures beyond a straight line and a parabola of each input.  The false-discovery rate is controlled
-over all tests of a kind, over all inputs and requirements.
+Numbers have two rank tests: whether failed cases are at one end of the range, and whether they are at both ends or in
+the middle.  Words and switches: whether a level has more than its proportion of the failed cases.  Pairs: whether the
+product of the two rank scores explains failures beyond a straight line and a parabola of each input.  The
+false-discovery rate is controlled over all tests of a kind, over all inputs and requirements.
 
-A driver is a difference between two groups of cases, not a cause: an input that is correlated with a driver is one,
+A driver is a difference between two groups of cases, not a cause: an input that is correlated with a driver is found,
 too.
 
 Sobol' points are not independent: the few of them in a narrow part of one input may all lie in one half of another one,
-which then separates failed from passed cases without an effect.  With 10 to 19 failed cases inputs without effect were
-found in 30 % of tests, of independent cases in 9 %; with 20 and more in no more of them.  Pairs without effect were
-found in up to a third, so that pairs are not tested.
+which then separates failed from passed cases without an effect.  With 10 to 19 failed cases, inputs without effect were
+found in 30 % of tests, and with independent cases in 9 %; with 20 and more no more often than these.  Pairs without
+effect were found in up to a third of tests, so pairs are not tested.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -39,11 +39,11 @@ BINS = 10  # of the success probability along an input
 class Driver:
     """An input, or a pair, that separates failed from passed cases.
 
-    where : at what values cases fail, one text an input: "high", "low", "at both ends", "at the high end", "at the low
-        end", "in the middle", or a level.
-    effect : Cliff's delta, 2 P(a failed case ranks above a passed one) - 1, in the direction of `where`; 1 separates
-        all, 0 none.  adjusted : p-value after Benjamini & Hochberg.
-    inside_failed of inside_tried : of a pair, cases in the cell `where` (outer thirds of numbers); 0 of a single one.
+    where : at what values cases fail, one text for each input: "high", "low", "at both ends", "at the high end", "at
+        the low end", "in the middle", or a level.
+    effect : Cliff's delta, 2 P(a failed case ranks above a passed one) - 1, in the direction of `where`; 1: complete
+        separation, 0: none.  adjusted : p-value after Benjamini & Hochberg.
+    inside_failed of inside_tried : for a pair, cases in the cell `where` (outer thirds of numbers); 0 for one input.
     """
 
     requirement: str
@@ -58,7 +58,7 @@ class Driver:
 
 @dataclass(frozen=True)
 class Drivers:
-    """Singles and pairs found, strongest evidence first, and how many of each were tested.
+    """Single inputs and pairs found, strongest evidence first, and how many of each were tested.
 
     undecided : requirements with fewer than `fewest` failed or passed cases.
     """
@@ -75,7 +75,7 @@ class Drivers:
 class SuccessCurve:
     """Success probability in bins of an input, with Clopper-Pearson limits; all float64[n_bins] or int64[n_bins].
 
-    middle, low, high : of the input's values in the bin (of a group: its level's index).
+    middle, low, high : of the input's values in the bin; for words, the index of the level.
     """
 
     middle: np.ndarray
@@ -89,7 +89,7 @@ class SuccessCurve:
 
 
 def failure_drivers(inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray], *, sobol: bool = False) -> Drivers:
-    """Drivers of each requirement.  failed : bool[n] by requirement, True also for a case without a number.
+    """The drivers of each requirement's failures.  failed : bool[n] by requirement, True also without a number.
 
     sobol : the cases are Sobol' points; pairs are not tested then.
     Benjamini & Hochberg, J. R. Stat. Soc. B 57 (1995), 289-300, over all tests of singles, and over all of pairs.

@@ -30,10 +30,10 @@ _LEFT = 1e-9  # of a metric's standard deviation: what rounding leaves where the
 def first_order(column: InputColumn, table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First-order index and its standard error per metric (columns of `table`, float64[n, n_metrics], finite).
 
-    1 less the variance that is left in bins of the input about a straight line in each, or about the mean of each level
-    of a group; as many degrees of freedom are taken off (Kelley's ε², Proc. Natl. Acad. Sci. 21 (1935), 554-559; hence
-    the index may come out below 0).  The 0.7 sqrt(n) bins are those of Plischke, Borgonovo & Smith, Eur. J. Oper. Res.
-    226 (2013), 536-550.  Without the lines, what a metric changes within the wide outer bins would count as noise.
+    The index is 1 minus the residual variance about a straight line in each bin of the input, or about the mean of each
+    level of words, with the degrees of freedom subtracted (Kelley's ε², Proc. Natl. Acad. Sci. 21 (1935), 554-559), so
+    it may be below 0.  The number of bins, 0.7 sqrt(n), is that of Plischke, Borgonovo & Smith, Eur. J. Oper. Res. 226
+    (2013), 536-550.  Without the lines, the trend within the wide outer bins would count as noise.
     The error is that of the influence function of the ratio of the two variances, too large at an index of 0.
     """
     share, error, _ = _by_bins(column, standardised(table))
@@ -41,12 +41,12 @@ def first_order(column: InputColumn, table: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def first_orders(columns: Sequence[InputColumn], table: np.ndarray, sobol: bool) -> tuple[np.ndarray, np.ndarray]:
-    """The same of several inputs, float64[n_columns, n_metrics].  sobol : the cases are Sobol' points.
+    """Index and error of several inputs, float64[n_columns, n_metrics] each.  sobol : the cases are Sobol' points.
 
-    In a bin of one input, Sobol' points do not hold the other inputs evenly, so that the bins of an input without
-    effect show that of another one: up to 0.4 of the variance with 2048 points of ten inputs.  What the bins of the
-    inputs explain, the strongest first, is taken off the metric therefore before another input that is not correlated
-    with them; a second round does so for the strongest, too.  The errors stay those of independent cases, which are
+    In a bin of one input, Sobol' points do not cover the other inputs evenly, so the bins of an input without effect
+    show the effect of another one: up to 0.4 of the variance with 2048 points of ten inputs.  Therefore the part of the
+    metric explained by the bins of stronger inputs is subtracted before a further input, uncorrelated with them, is
+    analysed; a second round does so for the strongest, too.  The errors are those of independent cases, which are
     larger than the scatter of Sobol' points.
     """
     shape = (len(columns), table.shape[1])
@@ -115,7 +115,7 @@ class Contributor(NamedTuple):
 
 
 def contributors(inputs: Mapping[str, Any], values: np.ndarray, sobol: bool = False) -> list[Contributor]:
-    """The inputs that differ between the cases, the strongest contributor first; of too few cases in their own order.
+    """The inputs that differ between the cases, the strongest contributor first; with too few cases, in their order.
 
     inputs : numbers, switches or words, by name;  values : float64[n], the metric, NaN for a case without a number.
     sobol : the cases are Sobol' points.

@@ -13,9 +13,9 @@ FARTHEST = 5.0e6  # m from the middle; a plane shows no more of a planet in a us
 
 @dataclass(frozen=True)
 class Footprint:
-    """points float64[n, 2]: metres east and north of the middle of n places;  reach : the farthest of them [m].
+    """points float64[n, 2]: n impact points, metres east and north of their middle;  reach : the largest distance [m].
 
-    ellipses and regions are in the same plane; none where the points have no width or are no random sample.
+    ellipses and regions are in the same plane; empty if the points have no width or are not a random sample.
     """
 
     plane: LocalPlane
@@ -33,10 +33,10 @@ class Footprint:
 def footprint(
     latitude: np.ndarray, longitude: np.ndarray, ellipsoid: tuple[float, float] = WGS84, random: bool = True
 ) -> Footprint | None:
-    """The footprint of places float64[n], finite, geodetic degrees.
+    """The footprint of impact points float64[n], finite, geodetic degrees.
 
-    random : the cases are a sample, so that regions mean something.  None without a place, and for places so far
-    apart that no plane holds them.
+    random : the cases are a random sample, so that regions are meaningful.  None without a point, and for points too
+    far apart for a plane.
     """
     plane = middle_plane(latitude, longitude, ellipsoid)
     if plane is None:

@@ -1,8 +1,8 @@
 """Impact points in a plane about their centre, in metres east and north.
 
-The plane is the azimuthal equidistant projection: every point lies at its true geodesic distance and direction from the
-centre, so the date line and the poles need no special treatment.  Lengths across the direction to the centre are too
-large by the factor (s/R) / sin(s/R) at the distance s: 0.1 % at 500 km, 1.7 % at 2000 km.
+The plane is the azimuthal equidistant projection: every point is at its true geodesic distance and direction from the
+centre, so the date line and the poles need no special treatment.  Lengths perpendicular to the direction to the centre
+are too large by the factor (s/R) / sin(s/R) at the distance s: 0.1 % at 500 km, 1.7 % at 2000 km.
 
 Geodesics on the ellipsoid: C. F. F. Karney, Journal of Geodesy 87 (2013), 43-55, by the library PROJ.
 """
@@ -25,7 +25,7 @@ CLOSE_ENOUGH = 1e-3  # m, of the middle
 
 @dataclass(frozen=True)
 class LocalPlane:
-    """The plane about a place: latitude and longitude [deg] of its origin, on an ellipsoid (radius [m], flattening)."""
+    """The plane about an origin: its latitude and longitude [deg], on an ellipsoid (radius [m], flattening)."""
 
     latitude: float
     longitude: float
@@ -53,7 +53,7 @@ class LocalPlane:
         return np.asarray(latitude), np.asarray(longitude)
 
     def stretch(self, distance: float) -> float:
-        """By how much lengths across the direction to the middle are too large at a distance [m] from it."""
+        """Factor by which lengths perpendicular to the direction to the origin are too large at a distance [m]."""
         angle = distance / self.ellipsoid[0]
         return float(1.0 / np.sinc(angle / np.pi) - 1.0)
 
@@ -61,9 +61,9 @@ class LocalPlane:
 def middle_plane(
     latitude: np.ndarray, longitude: np.ndarray, ellipsoid: tuple[float, float] = WGS84
 ) -> LocalPlane | None:
-    """The plane about the mean of places float64[n] [deg]: the place whose offsets to them add up to nothing.
+    """The plane about the mean of positions float64[n] [deg], the point whose offsets to them sum to zero.
 
-    None without a place, or where the places lie all around the planet, so that they have no middle.
+    None without a position, or if they lie all around the planet, so that they have no mean.
     Starts at the mean of the normal vectors (K. Gade, Journal of Navigation 63 (2010), 395-417).
     """
     phi, theta = np.radians(latitude), np.radians(longitude)

@@ -8,8 +8,8 @@ the estimate uses these alone, so it is unbiased, and its interval is that of a 
 Papaioannou, Geyer & Straub, Improved cross entropy-based importance sampling with a flexible mixture model, Reliability
 Engineering & System Safety 191 (2019) 106564.
 
-Valid up to some hundred inputs.  Where noise in flight decides the failures, few weights dominate the sum, which a
-remark says.  A region of failures that no case came near is not covered by the interval.
+Valid up to some hundred inputs.  If noise in flight decides the failures, few weights dominate the sum, and a remark
+says so.  The interval does not cover a region of failures that no case came near.
 """
 
 import math
@@ -43,8 +43,9 @@ def cross_entropy(
 ) -> RareEvent:
     """Probability that margin(u) <= 0 for u of `n_inputs` independent standard normal numbers.
 
-    margin : float64[n, n_inputs] -> float64[n];  not a number counts as failed.  cases_per_level : at least 500.
-    noise : call margin(u, addresses), int64[n]; see `rare_events`.
+    margin : float64[n, n_inputs] -> float64[n];  NaN counts as failed.  cases_per_level : at least 500.
+    noise : True: margin is called as margin(u, addresses), addresses int64[n]; see `rare_events`.
+    Returns a RareEvent.
     """
     if cases_per_level < 500:
         raise ValueError(f"{cases_per_level} cases per level are too few; 500 are the least")
@@ -137,7 +138,7 @@ def _level_record(margin: np.ndarray, target: np.ndarray, log_weight: np.ndarray
 
 
 def _effective(weight: np.ndarray) -> float:
-    """(sum w)^2 / sum w^2: so many equal weights would scatter as much.  Kish, Survey Sampling (1965)."""
+    """Effective sample size (sum w)^2 / sum w^2.  Kish, Survey Sampling (1965)."""
     square = float(weight @ weight)
     return float(weight.sum()) ** 2 / square if square > 0.0 else 0.0
 
@@ -152,9 +153,9 @@ def _estimate(
     confidence: float,
     n_inputs: int,
 ) -> RareEvent:
-    """Fresh cases from the frozen mixture.  The interval is symmetric in the logarithm.
+    """The estimate from new cases of the final mixture.  The interval is symmetric in the logarithm.
 
-    Weights of cases that all passed bound no probability: without a failure the plain cases of the first level do.
+    If all of them passed, their weights give no bound; the plain cases of the first level then give it.
     """
     before = flights.n
     _, margin, log_weight = _level(flights, mixture, n, max(n_inputs, 2), len(levels), rng)

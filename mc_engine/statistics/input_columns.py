@@ -1,4 +1,4 @@
-"""Dispersed inputs as columns of numbers: numbers as they are, words and switches as the index of their level."""
+"""Dispersed inputs as columns of numbers: numbers unchanged, words and switches as the index of their level."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -85,14 +85,14 @@ def rank_correlations(columns: Sequence[InputColumn]) -> np.ndarray:
 
 
 def beyond_chance(rank_correlation: Any, n_cases: int) -> Any:
-    """Whether two inputs are correlated, and not so by chance: five standard errors of a correlation of nothing."""
+    """Whether a rank correlation is not by chance: five standard errors of the correlation of independent inputs."""
     return abs(rank_correlation) > max(5.0 / np.sqrt(n_cases), 0.05)
 
 
 def equal_bins(column: InputColumn, bins: int) -> tuple[np.ndarray, int]:
     """Bin of each case (int64[n]) and the number of bins: about equally full, ties together, no bin empty.
 
-    A group, and a number with no more than `bins` values, has a bin for each level or value.
+    Words, and numbers with at most `bins` different values, have a bin for each level or value.
     """
     distinct, index = np.unique(column.values, return_inverse=True)
     if not column.levels and distinct.size > bins:

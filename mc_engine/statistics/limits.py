@@ -7,9 +7,9 @@ import numpy as np
 
 
 class LimitCounts:
-    """How many cases are outside which limits: all that verdicts count, added up over the parts of a table.
+    """Numbers of cases outside the limits of requirements, on which verdicts are based, summed over parts of a table.
 
-    A case that was not completed, or whose metric is not a number, is outside.
+    A case that was not completed, or whose metric is NaN, is outside.
     """
 
     def __init__(self, requirements: Sequence[Mapping[str, Any]]):
@@ -59,7 +59,7 @@ def inside_all(
 
 
 def inside_limits(values: np.ndarray, at_least: float | None, at_most: float | None) -> np.ndarray:
-    """bool[n]: inside the limits that there are; a value that is not a number, or infinite, is not."""
+    """bool[n]: inside the limits that are set; False for NaN and infinite values."""
     inside = np.isfinite(values)
     with np.errstate(invalid="ignore"):
         if at_most is not None:

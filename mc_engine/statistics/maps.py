@@ -6,11 +6,11 @@ the one with the smallest leave-one-out error: few where the metric follows the 
 inputs scatter it.
 
 The error has two parts.  One is the standard error of the fitted value, from the scatter of the cases about the
-surface, which includes the effect of all other inputs.  The other is the bias of a surface that bends within one
-neighbourhood, estimated by the step to a cubic surface through the same cases (the correction of Calonico, Cattaneo &
-Farrell, J. Am. Stat. Assoc. 113 (2018), 767-779, here added to the error and not to the value).  Points outside the
-hull of the cases, in a hole between them, or with a large error are NaN: a map does not extrapolate.  Where the two
-inputs explain less than `LEAST_EXPLAINED` of the metric's variance in cross-validation, no point has a value.
+surface, which includes the effect of all other inputs.  The other is the bias from curvature within the neighbourhood,
+estimated by the difference to a cubic surface through the same cases (the correction of Calonico, Cattaneo & Farrell,
+J. Am. Stat. Assoc. 113 (2018), 767-779, here added to the error and not to the value).  Points outside the hull of the
+cases, in a gap between them, or with a large error are NaN, as a map does not extrapolate.  If the two inputs explain
+less than `LEAST_EXPLAINED` of the metric's variance in cross-validation, all points are NaN.
 """
 
 from collections.abc import Sequence
@@ -46,17 +46,17 @@ class SurfaceMap:
 
     x : float64[nx], ascending
     y : float64[ny], ascending
-    value : float64[ny, nx], NaN where the cases support no value
-    error : float64[ny, nx], standard error of the value, or None where each node is one case
-    exact : bool, the nodes are cases themselves
-    cases_per_node : int, 1 for an exact grid; more where other inputs vary between the cases of a node, and value is
-        their mean; 0 for scattered cases
-    neighbours : int, cases that each point of a smoothed surface is fitted to
+    value : float64[ny, nx], NaN where the cases do not support a value
+    error : float64[ny, nx], standard error of the value, or None if each node is one case
+    exact : bool, the nodes are cases
+    cases_per_node : int, 1 for an exact grid; larger if other inputs vary between the cases of a node, whose mean is
+        the value; 0 for scattered cases
+    neighbours : int, number of cases to which each point of a smoothed surface is fitted
     n_used : int, cases with numbers
     n_tried : int, all cases
-    n_smoothed : int, of the n_used cases, those that the surface was made of
+    n_smoothed : int, number of the n_used cases from which the surface was made
     explained : float, fraction of the metric's variance that the surface predicts in cross-validation; 1 for an exact
-        grid; NaN where the cases are too few for that, or lie on too few levels of an input
+        grid; NaN if the cases are too few for that, or have too few levels of an input
 
     >>> map_metric(np.tile([0.0, 1.0], 2), np.repeat([0.0, 1.0], 2), np.arange(4.0)).exact
     True
@@ -83,7 +83,7 @@ def map_metric(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int = 101) -
     z : float64[n_tried], the metric
     points : int, grid points of a smoothed map along each axis
 
-    Returns a SurfaceMap, or None where the cases are too few, or lie on a line.
+    Returns a SurfaceMap, or None if the cases are too few, or lie on a line.
 
     Raises nothing for numbers of any size.
 
@@ -97,7 +97,7 @@ def map_metric(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int = 101) -
 def map_metrics(
     x: np.ndarray, y: np.ndarray, metrics: Sequence[np.ndarray], points: int = 101
 ) -> list[SurfaceMap | None]:
-    """The `map_metric` of each of several metrics over the same two inputs; what they have in common is made once."""
+    """The `map_metric` of each of several metrics over the same two inputs; common computations are made once."""
     (x, x_exponent), (y, y_exponent) = (near_one(np.asarray(values, dtype=np.float64)) for values in (x, y))
     scaled = [near_one(np.asarray(z, dtype=np.float64)) for z in metrics]
     surfaces = _surface_maps(x, y, [z for z, _ in scaled], points)

@@ -1,4 +1,4 @@
-"""Moments of a metric in two passes, the same to the last bit in any order of the cases and any grouping of parts.
+"""Moments of a metric in two passes, bit-identical for any order of the cases and any division into parts.
 
 First pass (`Tally`): number, smallest, largest and exact sum.  Second pass (`Spread`): exact sums of the powers of
 the distances from the mean; each power is rounded on its own, which depends on the case alone.
@@ -22,7 +22,7 @@ def finite_values(values: np.ndarray) -> np.ndarray:
 
 
 def number_or_none(value: float | None) -> float | None:
-    """None for what is no finite number."""
+    """The value; None for NaN and infinity."""
     return float(value) if value is not None and isfinite(value) else None
 
 
@@ -65,7 +65,7 @@ class ExactSum:
 
 
 class Tally:
-    """First pass: number, extremes and exact sum.  n_used : finite values of n_tried."""
+    """First pass: number, smallest, largest and exact sum.  n_used : finite values of n_tried."""
 
     def __init__(self) -> None:
         self.n_used = self.n_tried = 0
@@ -114,8 +114,8 @@ class Spread:
     def sd(self) -> float | None:
         """Standard deviation, n - 1 in its denominator; None for one value, 0 for equal ones.
 
-        The sum of distances takes off what the rounding of the mean left (Chan, Golub & LeVeque, Amer. Statist. 37
-        (1983), 242-247).
+        The sum of distances corrects the rounding of the mean (Chan, Golub & LeVeque, Amer. Statist. 37 (1983),
+        242-247).
         """
         n = self.tally.n_used
         if n < 2:

@@ -30,7 +30,7 @@ class Normality:
 
     @property
     def looks_normal(self) -> bool:
-        """Neither the test nor the shape speaks against a normal distribution."""
+        """Whether neither the test nor skewness and kurtosis contradict a normal distribution."""
         return self.p_value >= 0.01 or (abs(self.skewness) < 0.05 and abs(self.excess_kurtosis) < 0.1)
 
 
@@ -61,7 +61,7 @@ def normality(values: np.ndarray) -> Normality | None:
 
 
 def normality_of(n: int, m2: float, m3: float, m4: float) -> Normality | None:
-    """The same from the second to fourth central moment of n values, in any unit; m2 > 0.  None for n < 20."""
+    """The `normality` from the second to fourth central moment of n values, in any unit; m2 > 0.  None for n < 20."""
     if n < FEWEST:
         return None
     skewness, kurtosis = m3 / m2**1.5, m4 / m2**2

@@ -1,8 +1,8 @@
-"""Quantiles and their distribution-free limits: no assumption on the distribution but that cases are independent.
+"""Quantiles and their distribution-free limits, for independent cases from any distribution.
 
-The interval between two order statistics holds the quantile with a probability that is binomial whatever the
-distribution (Wilks, Ann. Math. Statist. 12 (1941), 91-96; David & Nagaraja, Order Statistics, 3rd ed., 7.1).
-A limit that would need more cases than there are is None, never a guess.
+The interval between two order statistics contains the quantile with a binomial probability, for any distribution
+(Wilks, Ann. Math. Statist. 12 (1941), 91-96; David & Nagaraja, Order Statistics, 3rd ed., 7.1).
+A limit that needs more cases than there are is None.
 """
 
 from bisect import bisect_left, bisect_right
@@ -23,8 +23,7 @@ class Quantile:
 
     probability : float, 0.5 is the median
     value : float, the estimate
-    lower : float or None, limit that holds with probability 1 - (1 - confidence)/2; None where the cases are too few
-        for it
+    lower : float or None, one-sided limit with confidence 1 - (1 - confidence)/2; None if the cases are too few for it
     upper : float or None, as `lower`
 
     >>> quantile(np.arange(100.0), 0.5)
@@ -65,7 +64,7 @@ def quantile_ranks(n: int, probability: float, confidence: float = 0.90) -> tupl
 
 
 def estimate_place(n: int, probability: float) -> float:
-    """Where between the ranks 1 ... n the estimate of the quantile lies, of n > 0 values.
+    """Position, between the ranks 1 ... n, of the estimate of a quantile from n > 0 values.
 
     The approximately median-unbiased one: Hyndman & Fan, Amer. Statist. 50 (1996), 361-365, type 8.
     """
@@ -88,7 +87,7 @@ def quantile(ordered: np.ndarray, probability: float, confidence: float = 0.90) 
     Returns a Quantile.  The estimate is approximately median-unbiased: Hyndman & Fan, Amer. Statist. 50 (1996),
     361-365, type 8.
 
-    Raises IndexError without a value, ValueError where the values do not ascend or are not numbers.
+    Raises IndexError without a value, ValueError if the values are not ascending or contain NaN.
 
     >>> round(quantile(np.arange(1000.0), 0.99).value, 2)
     989.66
@@ -100,7 +99,7 @@ def quantile(ordered: np.ndarray, probability: float, confidence: float = 0.90) 
 
 
 def ranked_quantile(n: int, at: Callable[[int], float], probability: float, confidence: float) -> Quantile:
-    """As `quantile`, from single order statistics: `at` returns the value of a rank of `ranks_read`."""
+    """The `quantile` from single order statistics: `at` returns the value at a rank of `ranks_read`."""
     place = estimate_place(n, probability)
     below, above = at(floor(place)), at(ceil(place))
     part = place - floor(place)

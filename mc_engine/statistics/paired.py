@@ -1,4 +1,4 @@
-"""Paired comparison of the levels of a choice: cases that differ in nothing else, and their differences."""
+"""Paired comparison of the levels of a choice: differences between cases that differ only in this choice."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,10 +12,10 @@ from mc_engine.statistics.order_statistics import Quantile, quantile
 
 @dataclass(frozen=True)
 class PairedDifference:
-    """Differences of two levels over their pairs; n_used of n_tried pairs have both numbers.
+    """Differences between two levels over their pairs; n_used of n_tried pairs have both numbers.
 
-    median : with its distribution-free interval (the sign test's);  smaller : pairs with a difference below 0,
-    and the Clopper-Pearson interval on their share.  None without a pair that has both numbers.
+    median : with its distribution-free interval (that of the sign test);  smaller : pairs with a difference below 0,
+    and the Clopper-Pearson interval on their fraction.  None without a pair that has both numbers.
     """
 
     n_used: int
@@ -28,10 +28,10 @@ class PairedDifference:
 
 
 def matching_rows(choice: np.ndarray, levels: Sequence[str], others: Mapping[str, np.ndarray]) -> np.ndarray:
-    """int64[n_groups, n_levels]: rows of the cases that differ in the choice alone, one column a level.
+    """int64[n_groups, n_levels]: rows of cases that differ only in the choice, one column for each level.
 
     choice : the level of each case;  others : every other dispersed input.  Cases without a partner at every level,
-    and those flown more than once, are in no group.
+    and duplicates, are in no group.
     """
     table = pd.DataFrame({f"input {k}": values for k, values in enumerate(others.values())})
     if table.shape[1] == 0:

@@ -1,18 +1,18 @@
 """First-order and total Sobol' indices of groups of inputs, from the pick-freeze cases of [sensitivity].
 
-The cases of a block share a point A, with its random draws, and an independent point B.  A_B(g) is A with group g taken
-from B.  A_B(g) and B have group g alone in common, so that their correlation is the first-order index of g; A_B(g) and
-A differ in group g alone, and 1 minus their correlation is its total index.  Random draws made in flight are one group.
-Inputs that are correlated with one another have to be in one group.
+The cases of a block are made from a point A, with its random draws, and an independent point B.  A_B(g) is A with group
+g taken from B.  A_B(g) and B have only group g in common, so their correlation is the first-order index of g.  A_B(g)
+and A differ only in group g, so 1 minus their correlation is its total index.  Random draws made in flight are one
+group.  Inputs that are correlated with one another must be in one group.
 
 A with a group at its nominal values shows by how much the variance falls without the dispersion of that group.  The
-mean of this fall over all values that the group may be held at is its first-order index; with interactions, the fall at
-one of them may be far from it, and from the total index.
+mean of this fall over all values at which the group may be held is its first-order index.  With interactions, the fall
+at one value may be far from this mean, and from the total index.
 
-A and B have nothing in common, but over finitely many blocks their correlation is not zero, and the indices share this
-chance correlation.  It is a control variate: each correlation is taken less a multiple of that of the independent rows,
-whose true value is zero.  The regression of the one influence function on the other gives the multiple, so that the
-variance falls by the square of the correlation between the two.
+A and B are independent, but over a finite number of blocks their correlation is not zero, and this chance correlation
+is also in the indices.  It serves as a control variate: a multiple of the correlation of the independent rows, whose
+true value is zero, is subtracted from each correlation.  The multiple comes from the regression of one influence
+function on the other, so the variance falls by the square of the correlation between the two.
 
 Janon, Klein, Lagnoux, Nodet & Prieur, ESAIM: Probab. Stat. 18 (2014), 342-364, eq. (6) (first order, pooled mean and
 variance) and section 2.3 (its asymptotic variance, by the delta method); Jansen, Comput. Phys. Commun. 117 (1999),
@@ -96,9 +96,9 @@ def whole_blocks(case_ids: np.ndarray, size: int) -> np.ndarray:
 
 
 def _scaled(y: np.ndarray, drawn: np.ndarray) -> np.ndarray | None:
-    """About zero and of order one, so that squares neither overflow nor lose digits; None without a spread.
+    """The values centred and scaled, so that squares neither overflow nor lose digits; None without a spread.
 
-    drawn : the rows of which no group is held at its nominal values; their spread counts.
+    drawn : the rows in which no group is held at its nominal values; the scale is their spread.
     """
     largest = float(np.abs(y).max(initial=0.0))
     if largest == 0.0:
@@ -124,7 +124,7 @@ def _correlation(y: np.ndarray, pairs: Sequence[tuple[int, int]]) -> tuple[float
 
 
 def _less(by_chance: tuple[float, np.ndarray], found: tuple[float, np.ndarray]) -> tuple[float, float]:
-    """A correlation less what it shares with one that is zero but for chance, and its standard error."""
+    """A correlation, corrected by another one whose true value is zero (control variate), and its standard error."""
     (chance, control), (value, influence) = by_chance, found
     if control @ control > 0.0:
         multiple = (influence @ control) / (control @ control)

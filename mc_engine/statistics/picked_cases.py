@@ -1,15 +1,15 @@
-"""Some of many cases, where all of them would take too long, or would not be told apart in a figure.
+"""A selection of many cases, for computations that take too long, or figures that are too crowded, with all of them.
 
-Never every second or fourth one: those of Sobol' points lie in one half of the range of some inputs.
+It is not every second or fourth case, because such Sobol' points lie in one half of the range of some inputs.
 """
 
 import numpy as np
 
 
 def picked_rows(n: int, most: int, seed: int = 0) -> np.ndarray:
-    """Rows, int64, ascending: all of n, or `most` of them, of equal stretches one each that is drawn at random.
+    """Rows, int64, ascending: all n, or `most` of them, one at random from each of `most` equal ranges.
 
-    Even over the case numbers, and without a pattern that could meet that of a design; the same rows each time.
+    They are even over the case numbers, without a pattern that could coincide with that of a design, and reproducible.
     """
     kept = min(n, most)
     if kept == n:

@@ -4,7 +4,7 @@ A limit state in standard normal space: a vector u of independent standard norma
 case, and `margin` is the distance inside the limit.  A case has failed where the margin is zero, negative or not a
 number.  `subset_simulation` and `importance_sampling` estimate the probability of failure.
 
-Noise in flight: where the margin depends on more than u, it is called as margin(u, noise), and `noise` addresses the
+Noise in flight: if the margin depends on more than u, it is called as margin(u, noise), where `noise` addresses the
 random draws of the case.  The estimate is then the probability over inputs and noise together, as for plain cases.
 """
 
@@ -26,12 +26,12 @@ FRESH = -1  # in place of a noise address: noise that no case has had yet
 
 @dataclass(frozen=True)
 class Level:
-    """One step towards the failures.
+    """One level on the way to the failures.
 
-    margin : all cases of the level are at or below it (mean over the runs).  probability : of being there.
-    runs : of the independent runs, how many came here.  cases : flown for it.
-    accepted : share of the steps of its chains that were taken; for importance sampling the share of its cases that
-        the next level rests on.
+    margin : all cases of the level are at or below it (mean over the runs).  probability : of such a margin.
+    runs : number of independent runs that reached the level.  cases : flown for it.
+    accepted : accepted fraction of the steps of its chains; for importance sampling, the fraction of its cases on which
+        the next level is based.
     """
 
     margin: float
@@ -46,9 +46,9 @@ class Evaluated:
     """Every case flown, in order.
 
     u : float64[n, n_inputs];  margin : float64[n], -inf where it was not a number;  level, noise : int64[n]
-    weight : float64[n], what the case counts for.  The weights of the failed cases add up to the probability.
-        With chains all weights add up to 1, and weigh any case as plain sampling would; with importance sampling
-        cases far from failure are few, and their weights say little.
+    weight : float64[n], weight of the case.  The weights of the failed cases sum to the probability.  With chains all
+        weights sum to 1, and represent plain sampling everywhere; with importance sampling cases far from failure are
+        few, and their weights are of little use.
     """
 
     u: np.ndarray
@@ -64,7 +64,7 @@ class Evaluated:
 
 @dataclass(frozen=True)
 class RareEvent:
-    """The estimated probability of failure with its two-sided interval, and all that it rests on.
+    """The estimated probability of failure with its two-sided interval, and the data on which it is based.
 
     relative_error : standard error over estimate; infinite without a failed case.
     method : "subset", "cross-entropy", or "plain" where the margins gave no direction and plain cases are counted.
@@ -120,11 +120,11 @@ class Flights:
 
 
 def interval_of_mean(estimates: np.ndarray, confidence: float) -> tuple[float, float]:
-    """Interval on what independent runs estimate in the mean.
+    """(lower, upper) : confidence interval on the mean of the estimates of independent runs.
 
     Estimates by subset simulation are products and nearly log-normal: Cox's interval on the mean of a log-normal, with
-    Student's t for the few runs, and ALLOWANCE.  With a run at zero it is Student's interval on the mean itself, cut
-    at zero; its upper end is at least the largest estimate, since runs at zero hide how far the estimates scatter.
+    Student's t for the few runs, and ALLOWANCE.  If a run is zero, it is Student's interval on the mean, truncated at
+    zero; its upper end is at least the largest estimate, because runs at zero hide the scatter of the estimates.
     Olsson, Journal of Statistics Education 13 (2005), no. 1, eq. (modified Cox).
     """
     n = estimates.size

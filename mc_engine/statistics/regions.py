@@ -1,7 +1,7 @@
 """Regions of a plane that contain a stated fraction of points: covariance ellipses, and distribution-free regions.
 
-A covariance ellipse contains its stated fraction of a normal distribution with known covariance; real scatter is seldom
-normal, so the cases inside are counted.  `density_regions` assumes only independent draws.
+A covariance ellipse contains its stated fraction of a normal distribution with known covariance.  Real scatter is
+seldom normal, so the cases inside are counted.  `density_regions` assumes only independent draws.
 """
 
 from dataclasses import dataclass
@@ -50,15 +50,15 @@ class Ellipse:
 def chi_square_scale(content: float) -> float:
     """k with P(chi^2 with 2 degrees of freedom <= k^2) = content: the square root of -2 ln(1 - content).
 
-    k = 3 holds 98.89 % of a normal distribution in two dimensions, not 99.73 %; that takes k = 3.439.
+    k = 3 contains 98.89 % of a normal distribution in two dimensions, not 99.73 %, for which k = 3.439.
     """
     return float(np.sqrt(-2.0 * np.log1p(-content)))
 
 
 def next_case_scale(content: float, n: int) -> float:
-    """k of the ellipse of n normal points that holds the *next* one with probability `content`; n > 2.
+    """k of the ellipse of n normal points that contains the *next* one with probability `content`; n > 2.
 
-    Larger than `chi_square_scale`, since mean and covariance are themselves estimates; the same for n to infinity.
+    It is larger than `chi_square_scale`, as mean and covariance are estimates, and approaches it for large n.
     Hotelling's T^2: k^2 = 2 (n^2 - 1) / (n (n - 2)) times the quantile of F with 2 and n - 2 degrees of freedom
     (Chew, J. Am. Stat. Assoc. 61 (1966), 605-617), which for 2 degrees of freedom is a power.
     """
@@ -70,8 +70,8 @@ def covariance_ellipses(
 ) -> tuple[Ellipse, ...]:
     """Ellipses of the stated contents about the mean of points float64[n, 2], all finite.
 
-    None of them for fewer than three points, and for points on a line: a standard deviation across it of no more
-    than `thinnest` (in the unit of the points), or than a billionth of that along it.
+    Empty for fewer than three points, and for points on a line: a standard deviation across it of at most `thinnest`
+    (in the unit of the points), or of at most a billionth of that along it.
     """
     frame = _principal_axes(points, thinnest)
     if frame is None:
@@ -171,7 +171,7 @@ class Density:
 
 @dataclass(frozen=True)
 class DensityRegion:
-    """Where a density is at a level or above: holds at least `content` of the population with `confidence`.
+    """The region with a density at or above a level: contains at least `content` of the population with `confidence`.
 
     inside : of the n points.
     """
@@ -192,12 +192,12 @@ class DensityRegion:
 def density_regions(
     points: np.ndarray, contents: tuple[float, ...] = CONTENTS, confidence: float = 0.90, thinnest: float = 0.0
 ) -> tuple[DensityRegion, ...]:
-    """Regions of any shape for points float64[n, 2]; those contents left out that the points are too few for.
+    """Regions of any shape for points float64[n, 2], without contents for which the points are too few.
 
-    A kernel density is made of half of the points, one of each two; the others rank themselves by it, and the level
-    is the order statistic below which at most 1 - content of the population lies, with the confidence (Wilks).  That
-    holds whatever the distribution and however poor the density: Lei, Robins & Wasserman, J. Am. Stat. Assoc. 108
-    (2013), 278-287.
+    A kernel density is made from half of the points, one of each two.  The other points are ranked by this density, and
+    the level is the order statistic below which at most 1 - content of the population lies, with the confidence
+    (Wilks).  This holds for any distribution, also if the density is poor: Lei, Robins & Wasserman, J. Am. Stat. Assoc.
+    108 (2013), 278-287.
     """
     smoothing = np.zeros(len(points), dtype=bool)
     smoothing[picked_rows(len(points), (len(points) + 1) // 2)] = True

@@ -1,13 +1,13 @@
 """Verdicts on requirements: is the required probability of being inside the limit demonstrated?
 
-pass              the lower confidence bound on the probability reaches the required one
-fail              even the upper confidence bound is below it
-not demonstrable  the number of cases decides neither way, or the design gives no probabilities
+pass              the lower confidence bound on the probability is at least the required probability
+fail              the upper confidence bound is below it
+not demonstrable  neither is true, because of too few cases, or the design gives no probabilities
 
 A case that failed, or whose metric is not a number, counts as not inside the limit.
 
-Where the number of cases was decided while looking at them (`looked`), the bounds are those of `time_uniform`, which
-hold at every number of cases; else those of `binomial`, which hold for a number fixed in advance.
+If the number of cases was decided while looking at the results (`looked`), the bounds are those of `time_uniform`,
+which hold at every number of cases; else those of `binomial`, which hold for a number fixed in advance.
 
 Several requirements.  Each verdict has the confidence that its requirement asks for.  The joint verdict counts the
 cases inside every limit at once, and requires of them 1 minus the sum of what each requirement may miss: if each is
@@ -56,7 +56,7 @@ class ShareLimits(Protocol):
 
 @dataclass(frozen=True)
 class Verdict:
-    """One requirement judged on the cases of a run, or, without metric and limits, all requirements at once.
+    """The verdict on one requirement from the cases of a run, or, without metric and limits, on all of them at once.
 
     name : str, of the requirement
     metric : str, column that is limited
@@ -71,20 +71,20 @@ class Verdict:
     estimate : float or None, passed / tried
     lower : float or None, one-sided lower confidence bound on the probability
     upper : float or None, one-sided upper confidence bound
-    demonstrated : float or None, the limit that the cases do demonstrate with share and confidence (tolerance limit);
+    demonstrated : float or None, the limit that the cases demonstrate with share and confidence (tolerance limit);
         None with two limits
-    enclosed : tuple or None, the two limits that they demonstrate, for a requirement with two: each moved inward by the
-        same distance, the margin, or outward where that is negative
-    needed : int or None, cases to extend the run to that demonstrate the share if no further one fails, or of a new run
-        of a design that cannot be extended; None if it is decided
-    accepted : int or None, most failures with which so many cases pass; None if they cannot
-    consumer_risk : float or None, probability of passing a system that just misses the share; None where the number of
-        cases was decided along the way, and then it is at most 1 - confidence
-    producer_risk : float or None, probability of not passing a system that fails half as often as it may
-    shared_outcome : str, the outcome at the confidence that makes all verdicts of a campaign hold together
-    failing : tuple of str, of a joint verdict the requirements that fail it where its own fraction does not
+    enclosed : tuple or None, for a requirement with two limits the two that the cases demonstrate: the required ones
+        moved inward by the same distance, the margin, or outward if it is negative
+    needed : int or None, total number of cases with which an extended run demonstrates the share if no further case
+        fails, or a new run if the design cannot be extended; None if the verdict is decided
+    accepted : int or None, most failures with which this number of cases passes; None if it cannot pass
+    consumer_risk : float or None, probability of passing a system that just misses the share; None if the number of
+        cases was decided along the way: then it is at most 1 - confidence
+    producer_risk : float or None, probability of not passing a system that fails half as often as allowed
+    shared_outcome : str, the outcome at the confidence at which all verdicts of a campaign hold together
+    failing : tuple of str, for a joint verdict the requirements that make it fail although its own fraction does not
     random : bool, the cases are a random sample, so that a fraction of them estimates a probability
-    looked : bool, the number of cases was decided by looking at them
+    looked : bool, the number of cases was decided by looking at the results
 
     >>> requirement = {"name": "fuel", "metric": "fuel_kg", "at_most": 2.5, "share": 0.9, "confidence": 0.9}
     >>> verdict = judge(requirement, np.linspace(1.0, 2.0, 40), np.ones(40, dtype=bool))
@@ -118,7 +118,7 @@ class Verdict:
 
     @property
     def remark(self) -> str:
-        """Why a joint verdict is another one than its own count gives; else empty."""
+        """Why a joint verdict differs from the one of its own count; else empty."""
         if self.failing:
             verb = "fails" if len(self.failing) == 1 else "fail"
             return f"{' and '.join(self.failing)} {verb} with confidence shared"
@@ -146,13 +146,13 @@ def judge_all(
     design: str = "mc",
     looked: bool = False,
 ) -> tuple[list[Verdict], Verdict | None]:
-    """Judge every requirement of a campaign, and all of them at once.
+    """The verdicts on all requirements of a campaign, one by one and jointly.
 
     requirements : sequence of dict ("name", "metric", "at_most", "at_least", "share", "confidence"), as in a manifest
     column : function from a metric's name to float64[n_tried]
     ok : bool[n_tried], whether the case was completed
     design : str, of the campaign; only for `SAMPLING_DESIGNS` does a fraction of cases estimate a probability
-    looked : bool, whether the number of cases was decided by looking at them; see `was_looked_at`
+    looked : bool, whether the number of cases was decided by looking at the results; see `was_looked_at`
 
     Returns (verdicts, joint): a list of Verdict, and the joint Verdict, or None for fewer than two requirements.
 
@@ -180,11 +180,11 @@ def judge_all(
 def judge_counted(
     counts: LimitCounts, ranked: Callable[[Judged, int], float] | None, design: str = "mc", looked: bool = False
 ) -> tuple[list[Verdict], Verdict | None]:
-    """The verdict on each requirement that was counted, and the joint one; None for a single one or none.
+    """The verdicts on the counted requirements, and the joint verdict; None for fewer than two requirements.
 
-    ranked : what is judged and rank to the order statistic of the usable values, from 1; None: no demonstrated bounds.
-    looked : whether the number of cases was decided by looking at them.  There is no joint verdict either where the
-    requirements together leave nothing to be asked for.  Its confidence is the smallest of theirs.
+    ranked : (Judged, rank from 1) to the order statistic of the usable values; None: no demonstrated bounds.
+    looked : whether the number of cases was decided by looking at the results.  The joint verdict is also None if the
+    joint probability to be demonstrated is zero.  Its confidence is the smallest of theirs.
     """
     requirements = counts.requirements
     share = (
@@ -223,9 +223,9 @@ def _joined(joint: Verdict, tests: Sequence[Verdict], further: ShareLimits) -> V
 
 
 def joint_share(shares: Sequence[float]) -> float | None:
-    """The share of cases that is inside all limits at once if each requirement misses no more than it may.
+    """The probability of being inside all limits at once that follows if every requirement is met.
 
-    Boole's inequality; None if nothing is left.
+    Boole's inequality; None if it gives no positive probability.
     """
     left = 1.0 - sum(1.0 - share for share in shares)
     return left if 0.0 < left < 1.0 else None
@@ -234,13 +234,13 @@ def joint_share(shares: Sequence[float]) -> float | None:
 def judge(
     requirement: Mapping[str, Any], values: np.ndarray, ok: np.ndarray, design: str = "mc", looked: bool = False
 ) -> Verdict:
-    """Judge one requirement.
+    """The verdict on one requirement.
 
     requirement : dict ("name", "metric", "at_most", "at_least", "share", "confidence"), as in a manifest
     values : float64[n_tried], the metric
     ok : bool[n_tried], whether the case was completed
     design : str, of the campaign
-    looked : bool, whether the number of cases was decided by looking at them
+    looked : bool, whether the number of cases was decided by looking at the results
 
     Returns a Verdict.
 
@@ -302,7 +302,7 @@ def _verdict(
 
 
 def _bounds_of(design: str, looked: bool) -> tuple[ShareLimits, ShareLimits]:
-    """What judges the cases that there are, and a run of more: an extended one, or a new one."""
+    """The bounds that judge the present cases, and those for a run of more cases: an extended one, or a new one."""
     extended = looked or design in EXTENSIBLE
     return (time_uniform if looked else binomial), (time_uniform if extended else binomial)
 
@@ -336,11 +336,11 @@ def _with_limits_shown(verdict: Verdict, judged: Judged, ranked: Callable[[Judge
 
 
 def was_looked_at(manifest: Mapping[str, Any], n_cases: int, n_flown: int | None = None) -> bool:
-    """Whether the number of cases was not fixed before the first flew: `run --until verdict`, extended or interrupted.
+    """Whether the number of cases was not fixed before the flight: `run --until verdict`, extended or interrupted runs.
 
     manifest : dict, of the run
-    n_cases : int, cases that the run is to have now
-    n_flown : int or None, those that it has; None for all of them
+    n_cases : int, number of cases of the run when it is complete
+    n_flown : int or None, number of cases flown; None for all of them
 
     Returns a bool, the argument `looked` of `judge_all`.
 

@@ -2,8 +2,8 @@
 
 The bits of a float64, read as a 64-bit integer, can be made to sort as the values do.  Each pass counts 16 of these
 bits, beginning with the leading ones, among the values that agree with a wanted one so far (radix selection: D. E.
-Knuth, The Art of Computer Programming, vol. 3, 2nd ed., 5.2.5 and 5.3.3); once few values are left, the next pass keeps
-and sorts them, and is the last.
+Knuth, The Art of Computer Programming, vol. 3, 2nd ed., 5.2.5 and 5.3.3).  When few values are left, the next pass, the
+last one, keeps and sorts them.
 
 Memory: 65 536 counts per wanted rank, or FEW values, whatever the number of values.
 """

@@ -1,17 +1,17 @@
-"""What a metric depends on, from the cases at hand: no further flights, any random design, any number of inputs.
+"""Sensitivity of a metric to the inputs, from the cases of a run: no further flights, any random design and dimension.
 
-spearman     rank correlation: a monotonic trend, whatever its shape
-src          standardised regression coefficient: the standard deviations that the metric moves per standard deviation
-             of the input, the others held; for independent inputs and r_squared near 1, src**2 is the share of variance
-prcc         partial rank correlation: the monotonic trend with the (linear) effect of the other ranks taken out
-first_order  Var(E[metric | input]) / Var(metric): the share of the variance that goes when the input becomes known,
-             of any shape; what is missing to 1 in the sum over independent inputs is due to interactions
-total        E[Var(metric | all other inputs)] / Var(metric): what the input does alone and together with others, from
-             a surrogate (`total_order`) of 200 cases at least; NaN where inputs are correlated, for which it has no
-             such meaning
+spearman     rank correlation: a monotonic trend of any shape
+src          standardised regression coefficient: change of the metric in standard deviations per standard deviation of
+             the input, others fixed; for independent inputs and r_squared near 1, src**2 is the fraction of variance
+prcc         partial rank correlation: the monotonic trend without the (linear) effect of the other ranks
+first_order  Var(E[metric | input]) / Var(metric): first-order Sobol' index, for effects of any shape; over independent
+             inputs, 1 minus the sum of the indices is due to interactions
+total        E[Var(metric | all other inputs)] / Var(metric): effect of the input alone and with others (total Sobol'
+             index), from a surrogate (`total_order`) of at least 200 cases; NaN for correlated inputs, for which it has
+             no such meaning
 
-For inputs that are correlated with each other src and prcc tell them apart as far as the cases do, while spearman and
-first_order also hold what an input owes to its partners.  first_order and total have standard errors, for independent
+For correlated inputs, src and prcc separate the inputs as far as the cases allow, while spearman and first_order
+include effects of the inputs with which one is correlated.  first_order and total have standard errors for independent
 cases (`mc`); `lhs` and `sobol` scatter less.  NaN: not defined, or too few cases.
 
 Saltelli et al., Global Sensitivity Analysis: The Primer (2008), ch. 1 (SRC, first-order index); Marino et al.,
@@ -38,9 +38,10 @@ _INDICES = ("spearman", "src", "prcc", "first_order", "first_order_error", "tota
 class Sensitivity:
     """Indices and standard errors, float64[n_inputs, n_metrics]; n_used int64[n_metrics] of n_tried cases.
 
-    r_squared : float64[n_metrics], the share of variance that the linear regression behind `src` explains.
-    unexplained : float64[n_metrics], the share that the surrogate behind `total` leaves; total may be larger by it.
-    correlated : the two inputs with the strongest rank correlation and that number; None below two inputs of order.
+    r_squared : float64[n_metrics], fraction of variance that the linear regression of `src` explains.
+    unexplained : float64[n_metrics], fraction that the surrogate of `total` leaves; total may be larger by it.
+    correlated : the two inputs with the strongest rank correlation, and its value; None for fewer than two inputs with
+        an order (numbers, or two levels).
     """
 
     inputs: tuple[str, ...]
@@ -75,7 +76,7 @@ def sensitivity(inputs: Mapping[str, Any], metrics: Mapping[str, np.ndarray], *,
 
     sobol : the cases are Sobol' points.
 
-    A case counts for a metric if it has a number there and in all inputs.  A group of more than two words has only a
+    A case counts for a metric if it has a number there and in all inputs.  An input with more than two words has only a
     first-order index, and is held constant in the regressions.
     """
     columns = input_columns(inputs)

@@ -1,7 +1,7 @@
 """Summaries and verdicts from a case table that is read part by part; bit-identical to those of the whole table.
 
-Two to four passes: the first counts, and finds means and extremes; the second computes the moments, and with the later
-ones the order statistics for quantiles, their intervals and the verdicts.
+Two to four passes are made.  The first counts, and finds means and extremes.  The second computes the moments, and
+together with later ones the order statistics for quantiles, their intervals and the verdicts.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -23,7 +23,7 @@ Passes = Callable[[Sequence[str]], Iterable[Mapping[str, np.ndarray]]]
 
 @dataclass(frozen=True)
 class Streamed:
-    """The result over all cases: a summary of every metric, the counts of limits, and the verdicts."""
+    """The result over all cases: a summary of every metric, the counts of cases outside limits, and the verdicts."""
 
     summaries: dict[str, Summary]
     counts: LimitCounts
@@ -43,7 +43,7 @@ def stream(
 ) -> Streamed:
     """`summarize` for every metric and `judge_all` for the requirements, which are on some of them.
 
-    passes : called once a pass with the metrics that it looks at; each time all parts of the same table in any order,
+    passes : called once for each pass with the metrics that it needs; returns all parts of the same table in any order,
     float64[n_part] by metric, NaN where a case was not completed.
     """
     counts = LimitCounts(requirements)

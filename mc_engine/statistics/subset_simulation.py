@@ -1,18 +1,18 @@
 """Subset simulation: a small probability as a product of larger ones, each estimated by Markov chains.
 
-The first level holds plain cases.  The tenth of them that is nearest to failure starts chains which explore what lies
-at or below that margin, the nearest tenth of these starts the next level, and so on.  Several runs are flown side by
-side, one step of all their chains at a time.  They share the margins of the levels and the size of the steps, and
-nothing else: the estimate is their mean, and the interval comes from their scatter, whatever the correlation within
-chains.
+The first level has plain cases.  The tenth of them with the smallest margins are the starts of Markov chains, which
+explore the inputs at or below the largest of these margins.  The tenth with the smallest margins among all these start
+the next level, and so on.  Several runs are flown together, one step of all their chains at a time.  They share only
+the margins of the levels and the size of the steps.  The estimate is their mean, and the interval comes from their
+scatter, so it does not depend on the correlation within chains.
 
 Au & Beck, Probabilistic Engineering Mechanics 16 (2001), 263-277.  Chains: conditional sampling, which works in any
 number of inputs, with adaptive step; Papaioannou, Betz, Zwirglmaier & Straub, Prob. Eng. Mech. 41 (2015), 89-103.
 Runs with shared levels have no bias once the levels are given: Cerou, Del Moral, Furon & Guyader, Statistics and
 Computing 22 (2012), 795-808.
 
-Valid where failure is reached through cases ever nearer to it.  A failure that comes without warning, from a part of
-the inputs where margins are large, may be missed by all runs; more cases per level help.
+Valid if the margin decreases gradually towards failure.  An abrupt failure, in a part of the inputs where margins are
+large, may be missed by all runs; more cases per level help.
 """
 
 import math
@@ -80,9 +80,10 @@ def subset_simulation(
 ) -> RareEvent:
     """Probability that margin(u) <= 0 for u of `n_inputs` independent standard normal numbers.
 
-    margin : float64[n, n_inputs] -> float64[n];  not a number counts as failed.
+    margin : float64[n, n_inputs] -> float64[n];  NaN counts as failed.
     cases_per_level : of all runs together, at least 50 for each.
-    noise : call margin(u, addresses), int64[n]; see `rare_events`.
+    noise : True: margin is called as margin(u, addresses), addresses int64[n]; see `rare_events`.
+    Returns a RareEvent.
     """
     per_run = cases_per_level // RUNS
     if per_run * SHARE < FEWEST_SEEDS:
@@ -155,10 +156,10 @@ def _chains(
 ) -> tuple[Members, float, float]:
     """(members at or below the threshold, share of steps accepted, scale of the steps); `per_run` for each run.
 
-    The seeds are among the members.  Candidate: rho u + sigma times a normal vector, rho^2 + sigma^2 = 1, which leaves
-    the normal density alone; so it is accepted where it stays at or below the threshold.  Papaioannou et al. (2015),
-    eq. (15) and (24).  Half of the steps keep the noise of the flight, the others draw it anew with the inputs: both
-    leave its distribution alone.
+    The seeds are among the members.  Candidate: rho u + sigma times a normal vector, rho^2 + sigma^2 = 1, which keeps
+    the normal density, so it is accepted if it is at or below the threshold.  Papaioannou et al. (2015), eq. (15) and
+    (24).  Half of the steps keep the noise of the flight, the others draw it anew with the inputs; both keep its
+    distribution.
     """
     state, length = _shared_out(seeds.take(rng.permutation(seeds.case.size)), per_run)
     spread = np.minimum(seeds.u.std(axis=0), 1.0)

@@ -1,8 +1,8 @@
 """Summary of one metric over the cases: moments, extremes and quantiles with their confidence intervals.
 
 Every summary states n_used of n_tried: failed cases and NaN have no number, and are never dropped silently.  Mean and
-quantiles are exact, whether the values are in memory (`summarize`) or read part by part (`streaming`), and no bit
-depends on the order or the size of the parts.
+quantiles are exact, for values in memory (`summarize`) and for values read part by part (`streaming`).  No bit depends
+on the order or the size of the parts.
 """
 
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ _ROUNDING = 1e-12  # of the size of two numbers: more than rounding adds up to o
 
 
 def nearly_equal(low: float, high: float) -> bool:
-    """Whether two numbers are the same but for rounding."""
+    """Whether two numbers differ only by rounding."""
     low, high = float(low), float(high)  # whose difference may be infinite without a word
     return high == low or abs(high - low) <= _ROUNDING * max(abs(low), abs(high))
 
 
 @dataclass(frozen=True)
 class Summary:
-    """Statistics of one metric; what n_used is too small for is None, or an empty tuple.
+    """Statistics of one metric; None, or an empty tuple, for those that need more than n_used cases.
 
     n_used : int, cases with a finite value
     n_tried : int, all cases
@@ -52,7 +52,7 @@ class Summary:
 
     @property
     def constant(self) -> bool:
-        """Whether all values are the same, but for rounding."""
+        """Whether all values differ only by rounding."""
         return self.minimum is not None and self.maximum is not None and nearly_equal(self.minimum, self.maximum)
 
     @property
@@ -66,7 +66,7 @@ class Summary:
 
 
 def summarize(values: np.ndarray, *, probabilities: tuple[float, ...] = QUANTILES, confidence: float = 0.90) -> Summary:
-    """Moments and quantiles of a metric, the same to the last bit in any order of the cases.
+    """Moments and quantiles of a metric, bit-identical for any order of the cases.
 
     values : float64[n_tried]; NaN and infinite values count as tried, not as used
     probabilities : tuple of float, of the quantiles
@@ -98,7 +98,7 @@ def without_number(tally: Tally, confidence: float) -> Summary:
 
 
 def summary_of(spread: Spread, quantiles: tuple[Quantile, ...], confidence: float) -> Summary:
-    """The summary of what two passes have counted."""
+    """The summary from the results of two passes."""
     tally = spread.tally
     return Summary(
         n_used=tally.n_used,

@@ -1,11 +1,11 @@
-"""Ranks of distribution-free tolerance limits: the limits that the cases at hand demonstrate, whatever was required.
+"""Ranks of distribution-free tolerance limits: the limits that the cases demonstrate, independent of the required ones.
 
-An upper limit is the (A + 1)-th largest value when A is the most failures with which so many cases still demonstrate
-the probability (Wilks, Ann. Math. Statist. 12 (1941), 91-96).  Cases without a number are worse than every number and
-are lost first.  A limit that would need more cases than there are is None.
+An upper limit is the (A + 1)-th largest value, where A is the most failures with which this number of cases still
+demonstrates the probability (Wilks, Ann. Math. Statist. 12 (1941), 91-96).  Cases without a number count as worse than
+every number, so they use up the failures first.  A limit that needs more cases than there are is None.
 
-usable : cases with a number.  accepted : acceptance number of these and of the `no_number` others, None if there is
-    none.  Ranks are those of order statistics, 1 ... usable.
+usable : cases with a number.  accepted : acceptance number for these and the `no_number` others together, None if
+    there is none.  Ranks are those of order statistics, 1 ... usable.
 """
 
 from typing import NamedTuple
@@ -16,10 +16,10 @@ from mc_engine.statistics.worst import Limits
 
 
 class Judged(NamedTuple):
-    """Numbers whose tolerance limit is what a requirement demonstrates: a metric, or how far it is inside two limits.
+    """The numbers whose tolerance limit is sought: a metric, or for two limits its distance inside the nearer one.
 
-    A case is between two limits that are both moved inward by a distance where it is inside the nearest of them by that
-    distance: one number with one limit, on whichever side the cases lie.
+    A case stays between two limits that are both moved inward by a distance if it is inside the nearer one by at least
+    that distance.  So two limits need one number with one limit, on whichever side the cases lie.
     """
 
     metric: str
@@ -33,7 +33,7 @@ class Judged(NamedTuple):
 
 
 def upper_rank(usable: int, accepted: int | None, no_number: int) -> int | None:
-    """The rank of the value that bounds the share from above."""
+    """The rank of the value that is the upper tolerance limit."""
     if accepted is None:
         return None
     left_out = accepted - no_number  # so many larger values
@@ -41,6 +41,6 @@ def upper_rank(usable: int, accepted: int | None, no_number: int) -> int | None:
 
 
 def lower_rank(usable: int, accepted: int | None, no_number: int) -> int | None:
-    """The rank of the value that bounds the share from below."""
+    """The rank of the value that is the lower tolerance limit."""
     mirrored = upper_rank(usable, accepted, no_number)
     return None if mirrored is None else usable + 1 - mirrored

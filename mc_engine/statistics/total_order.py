@@ -8,9 +8,10 @@ such a sum is the sum of the squared coefficients.  Steps in a single input, whi
 from the means of its bins.
 
 Valid for independent inputs.  What the surrogate does not explain (noise in flight, sharp corners of three and more
-inputs, an edge between passed and failed cases) belongs to no input: `unexplained` is its fraction of the variance, and
-a total index may be larger by up to it.  From fewer cases than `FEWEST_CASES` the terms are too few, and neither the
-errors nor what is unexplained tell what they miss: of 50 cases 90 % intervals held 57 to 70 %, of 200 75 to 95 %.
+inputs, an edge between passed and failed cases) is attributed to no input: `unexplained` is its fraction of the
+variance, and a total index may be larger by up to it.  With fewer cases than `FEWEST_CASES` there are too few terms,
+and neither the errors nor `unexplained` show what is missing: 90 % intervals covered 57 to 70 % with 50 cases, and 75
+to 95 % with 200.
 
 Sudret, Reliab. Eng. Syst. Saf. 93 (2008), 964-979 (indices from polynomial chaos); Blatman & Sudret, Prob. Eng. Mech.
 25 (2010), 183-197 (sparse, chosen by the data).
@@ -59,10 +60,10 @@ class _Functions:
 
 
 def total_order(columns: Sequence[InputColumn], table: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Total indices and their standard errors, float64[n_inputs, n_metrics], and the unexplained shares [n_metrics].
+    """Total indices and their standard errors, float64[n_inputs, n_metrics], and unexplained fractions [n_metrics].
 
-    columns : that vary, without a missing value.  table : float64[n, n_metrics], finite, none constant.  The error is
-    that of chance in the cases and the fit; what is unexplained is not part of it.
+    columns : varying inputs without missing values.  table : float64[n, n_metrics], finite, no column constant.  The
+    error covers the random cases and the fit, but not the unexplained fraction.
     """
     most = max(MOST_VALUES // len(columns), FEWEST_PICKED)
     rows = picked_rows(len(table), most)

@@ -1,7 +1,7 @@
 """The worst cases of a metric: those with the smallest margin to the nearest limit that a requirement sets.
 
-Without a requirement, the largest values are the worst, or the smallest where the campaign file asks for them.  Failed
-cases have no number and are listed separately.
+Without a requirement, the largest values are the worst, or the smallest if the campaign file says so.  Failed cases
+have no number and are listed separately.
 """
 
 from collections.abc import Iterable, Mapping
@@ -18,7 +18,7 @@ class Limits(NamedTuple):
 
     @property
     def two_sided(self) -> bool:
-        """Whether there are both."""
+        """Whether both limits are set."""
         return self.at_most is not None and self.at_least is not None
 
     @property
@@ -35,11 +35,11 @@ class Limits(NamedTuple):
         return np.minimum(above, below) + 0.0 * values
 
     def margins(self, values: np.ndarray) -> np.ndarray:
-        """float64[n]: the distances over the reach."""
+        """float64[n]: the distances divided by the reach."""
         return self.distances(values) / self.reach
 
     def largest_is_worst(self, values: np.ndarray) -> bool:
-        """Whether large values are the bad ones; with two limits, whether the value nearest to one is at the upper."""
+        """Whether large values are the worst; with two limits, whether the value nearest to a limit is at the upper."""
         if self.at_most is None or self.at_least is None:
             return self.at_least is None
         finite = values[np.isfinite(values)]
@@ -89,9 +89,9 @@ def worst_cases(
 
 
 class WorstSoFar:
-    """As `worst_cases`, for cases that are read part by part in the order of their numbers.
+    """The `worst_cases` of cases that are read part by part in the order of their numbers.
 
-    case_ids : int64, of the worst.
+    case_ids : int64, the worst cases so far.
     """
 
     def __init__(self, count: int, limits: Limits | None, largest: bool = True):
@@ -99,7 +99,7 @@ class WorstSoFar:
         self.case_ids, self._goodness = np.zeros(0, dtype=np.int64), np.zeros(0)
 
     def add(self, values: np.ndarray, first: int) -> None:
-        """values : float64[n] of the cases `first` and on, NaN for one that was not completed."""
+        """Add cases.  values : float64[n] of the cases from `first` on, NaN for one that was not completed."""
         candidates = np.isfinite(values)
         finite = values if candidates.all() else np.where(candidates, values, np.nan)
         goodness = _goodness(finite, self.largest, self.limits)
