@@ -84,7 +84,7 @@ def report(
 @app.command()
 @exit_status()
 def status(place: RunPlace) -> None:
-    """Print the progress of a run and the statuses of its cases; for a tuning or a rare event, its result."""
+    """Print the progress of a run and the statuses of its cases. For a tuning or a rare event, print its result."""
     from mc_engine.runner.summary import case_line
     from mc_engine.store.case_rows import recorded_cases, rows_so_far
     from mc_engine.store.run_files import RARE_EVENT, TUNING, kind_of
@@ -134,7 +134,7 @@ def summary(
     place: RunPlace,
     metric: Annotated[list[str] | None, typer.Option(help="Only this metric; may be given several times.")] = None,
 ) -> None:
-    """Print moments and quantiles of the metrics of a run of any size; it is read part by part."""
+    """Print moments and quantiles of the metrics of a run. The run may have any size; it is read part by part."""
     from mc_engine.runner.summary import summaries, summary_lines
     from mc_engine.section import ReportSection
     from mc_engine.statistics import SAMPLING_DESIGNS
@@ -155,7 +155,7 @@ def summary(
 @app.command()
 @exit_status()
 def verify(place: RunPlace) -> None:
-    """Verify all checksums of a run, a tuning or a rare event, with its reports and replays."""
+    """Verify all checksums of a run, a tuning or a rare event. Reports and replays are included."""
     from mc_engine.store.run_files import kind_of
     from mc_engine.store.verification import RESUME, damages, remedies
 
@@ -260,7 +260,7 @@ def _epoch_of(store: "Store") -> str | None:
 @app.command()
 @exit_status()
 def publish(folder: RunFolder, url: Url) -> None:
-    """Copy a run to an object store; only missing or different files are sent (needs fsspec, s3fs)."""
+    """Copy a run to an object store. Only missing or different files are sent (needs fsspec, s3fs)."""
     advise(lambda: f"interrupted; `mc-engine publish {shell_word(folder)} {shell_word(url)}` sends the rest")
     existing_run(folder)
     echo_publication(folder, url)
@@ -287,7 +287,7 @@ def echo_publication(folder: Path, url: str) -> None:
 def fetch(
     url: Url, folder: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of the copy.", parser=new_file)]
 ) -> None:
-    """Copy a run from an object store to a new directory; the checksum of every part is verified."""
+    """Copy a run from an object store to a new directory. The checksum of every part is verified."""
     from mc_engine.store.object_store import fetch
 
     refuse_unwritable_folder(folder, option="")

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of the new campaign.", parser=new_file)],
 ) -> None:
-    """Copy a minimal campaign, its model and its campaign file, to DIR as a start for your own."""
+    """Copy a minimal campaign, model and file, to DIR. It is a start for your own."""
     from mc_engine.campaign.search import SHIPPED
 
     names = ("campaign.toml", "model.py")
@@ -159,7 +159,7 @@ def plan(
         ),
     ] = False,
 ) -> None:
-    """Print the number of cases that demonstrates a success probability, with 0, 1, 2, ... failures among them.
+    """Print how many cases demonstrate a success probability. The failures among them may be 0, 1, 2, ...
 
     Give --share and --confidence, or a campaign: then the table is for its requirements, one by one and together.
     """
@@ -221,7 +221,7 @@ def sample(
 @app.command("list")
 @exit_status()
 def list_() -> None:
-    """List the shipped campaigns: their names, as `run` takes them, and their titles."""
+    """List the shipped campaigns, by the names that `run` takes."""
     from mc_engine.campaign.search import list_campaigns, model_sources
 
     campaigns, sources = list_campaigns(), model_sources()
@@ -245,7 +245,7 @@ def schema() -> None:
 @app.command()
 @exit_status()
 def units() -> None:
-    """List all units for models and campaign files, by quantity; the first of each is the SI unit."""
+    """List all units for models and campaign files. They are sorted by quantity; the first of each is the SI unit."""
     from mc_engine.units import OTHER_SUFFIXES, UNITS, by_quantity
 
     groups = by_quantity()

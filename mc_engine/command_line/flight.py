@@ -334,7 +334,7 @@ def extend(
     patience: Patience = None,
     publish: Publish = None,
 ) -> None:
-    """Add cases to a run; a run of 1000 cases extended to 2000 equals a run of 2000 cases."""
+    """Add cases to a run. A run of 1000 cases extended to 2000 equals a run of 2000 cases."""
     from mc_engine.sampling.designs import extension_problem
 
     _refuse_publication(publish)
@@ -361,7 +361,7 @@ def rerun(
     memory: Memory = None,
     patience: Patience = None,
 ) -> None:
-    """Fly failed cases of a run again, in processes, for example after their worker was killed."""
+    """Fly the failed cases of a run again. They fly in processes, for example after their worker was killed."""
     store = existing_run(folder)
     if not failed:
         leave(USAGE, "rerun flies only failed cases again: add --failed; the others would come out with the same bits")
@@ -388,7 +388,7 @@ def merge(
     ] = None,
     workers: Workers = None,
 ) -> None:
-    """Join the shards of a campaign into one run, with the same table as a run without shards."""
+    """Join the shards of a campaign into one run. Its table is that of a run without shards."""
     for shard in shards:
         existing_run(shard)
     refuse_occupied_folder(out, option="")

@@ -46,7 +46,7 @@ def debug(
         typer.Option("--at-nan", help="Stop at the line that ends the flight by a result that is infinite or NaN."),
     ] = False,
 ) -> None:
-    """Fly one case by Python and stop in a debugger, inside the model's own functions.
+    """Fly one case by Python and stop in a debugger. It stops inside the model's own functions.
 
     Without an option it stops at the first line of rhs, at the start. If the physics contains breakpoint() or print, it
     stops only there. The debugger is that of Python's breakpoint(): pdb, or the one that PYTHONBREAKPOINT names.
@@ -110,7 +110,7 @@ def _echo_end(who: str, ended: "Debugged", stop: "Stop | None") -> None:
 @app.command(context_settings={"ignore_unknown_options": True})
 @exit_status()
 def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE", min=0, help="Its case_id.")]) -> None:
-    """Fly one case again, compare every stored number bit for bit, and write and plot its time history.
+    """Fly one case again and compare it bit for bit. Its time history is written and plotted.
 
     The numbers of a simulator that is not deterministic are compared within its tolerance.
     """

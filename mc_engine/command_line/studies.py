@@ -56,7 +56,7 @@ def import_(
     cases: Cases = None,
     no_report: NoReport = False,
 ) -> None:
-    """Make a run from results computed elsewhere: a table of case_id, inputs and metrics.
+    """Make a run from results of another program. They are a table of case_id, inputs and metrics.
 
     The inputs must agree with those of `mc-engine sample` for the campaign.
     """
@@ -88,7 +88,7 @@ def tune(
     no_report: NoReport = False,
     workers: Workers = None,
 ) -> None:
-    """Search for the parameters with the best metrics, as [tuning] of FILE specifies (needs pymoo)."""
+    """Search for the parameters with the best metrics. [tuning] of FILE specifies both (needs pymoo)."""
     advise(lambda: NOTHING_BEGUN)
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.store.run_files import default_folder
@@ -133,7 +133,7 @@ def rare(
     no_report: NoReport = False,
     workers: Workers = None,
 ) -> None:
-    """Estimate the probability, down to one in millions, that a requirement of FILE is not met."""
+    """Estimate how probable it is that a requirement is not met. The probability may be down to one in millions."""
     advise(lambda: NOTHING_BEGUN)
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.store.run_files import default_folder
@@ -252,7 +252,7 @@ def published(
         ),
     ] = None,
 ) -> None:
-    """Compare published values with ours, as Markdown; outcomes: reached, close, improved, not reached, unknown.
+    """Compare published values with ours, as Markdown. Outcomes: reached, close, improved, not reached, unknown.
 
     Without a name: the number of each outcome in the shipped campaigns, and the headline numbers.  Our values are read
     from `published.lock.toml`, unless --compute is given.
@@ -325,7 +325,7 @@ def bench(
         typer.Option("--card", help="Measure cards and all cores of this machine; --backend auto uses the result."),
     ] = False,
 ) -> None:
-    """Measure the speed of a campaign on one thread, and the gain by SIMD batches over one case at a time.
+    """Measure the speed of a campaign on one thread. One case at a time is compared with SIMD batches.
 
     With --methods, every method is timed with the longest step, or the loosest tolerance, at which its error is that of
     the model's own method. Only flights are timed, not compiling, sampling and storing. Nothing is stored.

@@ -373,3 +373,9 @@ def test_a_path_that_is_no_run_is_a_usage_error_that_names_it(here, calls, verb,
     case = [0] if verb == ["replay"] else []
     fails_with(2, call(*verb, folder, *case), folder)
     assert calls.runner == []
+
+
+def test_the_list_of_commands_says_what_each_does_in_80_columns():
+    listed = call("--help").stdout.split("Commands:")[1]
+    assert "  replay " in listed
+    assert "..." not in listed
