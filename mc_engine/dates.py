@@ -8,10 +8,10 @@ _DAY_S = 86_400.0
 
 
 def modified_julian_date(text: str) -> float:
-    """Days since 1858-11-17 00:00 UTC of a date as ISO 8601 writes it; without an offset it is UTC.
+    """Days since 1858-11-17 00:00 UTC of a date in ISO 8601; UTC if it has no offset.
 
-    A day counts 86 400 s, so a leap second, :60, is no date.  ValueError where the text is no date, OverflowError where
-    its offset leads out of the years 1 to 9999.
+    A day has 86 400 s, so leap seconds, :60, are not supported.  ValueError for text that is not a date, OverflowError
+    if the offset leads out of the years 1 to 9999.
     """
     moment = datetime.fromisoformat(text)
     moment = moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
@@ -22,6 +22,6 @@ def modified_julian_date(text: str) -> float:
 def date_text(mjd: float) -> str:
     """The date in UTC, to a microsecond, of a modified Julian date.  OverflowError outside the years 1 to 9999.
 
-    ValueError for what is not a number.
+    ValueError for NaN.
     """
     return (_ORIGIN + timedelta(days=mjd)).replace(tzinfo=None).isoformat()

@@ -35,7 +35,7 @@ class EngineError(Exception):
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake: its place in the campaign file (dotted keys), and what to do about it."""
+    """One mistake: its location in the campaign file (dotted keys), and what to do about it."""
 
     place: str
     message: str
@@ -49,7 +49,7 @@ class CampaignError(EngineError):
     """The campaign cannot be flown as written.
 
     source : str, the campaign file, or the option of the command line
-    problems : sequence of Problem (place, message), every mistake found; a place is dotted, as "dispersion.ve_pct.dist"
+    problems : sequence of Problem (place, message), every mistake found; place : keys, as "dispersion.ve_pct.dist"
 
     >>> try:
     ...     load_campaign("minimal", cases=0)
@@ -69,7 +69,7 @@ class CampaignError(EngineError):
 
 
 class ModelError(EngineError):
-    """The model breaks its contract: a missing field, a wrong shape, or code that cannot be compiled.
+    """The model has an error: a missing field, a wrong shape, or code that cannot be compiled.
 
     >>> from mc_engine.model import load_model
     >>> try:
@@ -81,7 +81,7 @@ class ModelError(EngineError):
 
 
 class StoreError(EngineError):
-    """The run directory cannot be read or written as it stands; the text names the path.
+    """The run directory cannot be read or written in its present state; the text names the path.
 
     >>> try:
     ...     open_store("runs/small").row(99)
@@ -92,17 +92,17 @@ class StoreError(EngineError):
 
 
 class DiskError(StoreError):
-    """The disk refused an operation; the text names the path.  What was committed before is safe."""
+    """The disk refused an operation; the text names the path.  Committed cases are safe."""
 
 
 class UsageError(StoreError):
-    """A request that a run, a folder or a URL cannot meet; nothing is damaged, and the text says what can be done."""
+    """A request that is impossible for a run, a folder or a URL; nothing is damaged, and the text gives the remedy."""
 
 
 class RunInterrupted(EngineError):
-    """The run was stopped, by Ctrl-C or a full disk; the text holds the command that completes it.
+    """The run was stopped, by Ctrl-C or a full disk; the text contains the command that completes it.
 
-    Chunks that were complete are kept, and `resume` flies the rest.
+    Completed chunks are kept, and `resume` flies the rest.
 
     >>> def stop(done, wanted, failed):
     ...     raise RunInterrupted(f"stopped after {done} of {wanted} cases")

@@ -15,7 +15,7 @@ Number = TypeVar("Number", float, np.ndarray)
 
 @dataclass(frozen=True)
 class Unit:
-    """factor: SI value of one unit.  suffix: what a column name in this unit ends in.  quantity: what it measures."""
+    """factor: SI value of one unit.  suffix: ending of column names in this unit.  quantity: physical quantity."""
 
     factor: float
     suffix: str
@@ -117,12 +117,12 @@ UNITS = {
 
 
 def by_quantity() -> dict[str, list[str]]:
-    """The names of all units, by what they measure; the first of each is that of SI.  Plain numbers have no name."""
+    """The names of all units, by quantity; the first of each is the SI unit.  Plain numbers have no name."""
     return {quantity: [name for name in units if name] for quantity, units in _BY_QUANTITY.items()}
 
 
 def nearest_unit(unit: str, allowed: Iterable[str]) -> str | None:
-    """The allowed unit that was probably meant, such as "N m" by "Nm" and "m/s^2" by "m/s²"; or None."""
+    """The allowed unit that was probably meant, such as "N m" for "Nm" and "m/s^2" for "m/s²"; or None."""
     names = [name for name in allowed if name]
     squeezed = {_squeezed(name): name for name in names}
     without_bars = {short.replace("/", ""): name for short, name in squeezed.items()}
@@ -150,25 +150,25 @@ def _squeezed(unit: str) -> str:
 
 
 def unit_suffix(unit: str) -> str:
-    """The suffix, with its underscore, of column names in `unit`; KeyError for a unit not in UNITS."""
+    """The suffix, with its underscore, of column names in `unit`; KeyError for a unit that is not in UNITS."""
     return UNITS[unit].suffix
 
 
 def convert(value: Number, unit: str, to: str) -> Number:
-    """`value` in `unit` as a number in the unit `to`; both must measure the same quantity."""
+    """`value` converted from `unit` to the unit `to`; both must be units of the same quantity."""
     # Multiply first: 250 m in km is then 0.25 and not 250 times a rounded thousandth.
     return value * UNITS[unit].factor / UNITS[to].factor
 
 
 def compatible(unit: str) -> list[str]:
-    """All units of the quantity that `unit` measures."""
+    """All units of the same quantity as `unit`."""
     return [name for name, other in UNITS.items() if other.quantity == UNITS[unit].quantity]
 
 
 def unit_of(name: str, said: Callable[[str], str] = 'unit="{}"'.format) -> str:
-    """The unit at the end of a column's name; ModelError where there is none, or where it may be two.
+    """The unit at the end of a column's name; ModelError if there is none, or if the ending fits two units.
 
-    said : what a user writes to say a unit.
+    said : for error messages, how a user states a unit.
 
     >>> unit_of("burn_dv_m_s"), unit_of("heat_load_mj_m2")
     ('m/s', 'MJ/m^2')
@@ -186,7 +186,7 @@ def unit_of(name: str, said: Callable[[str], str] = 'unit="{}"'.format) -> str:
 
 
 def units_meant(name: str) -> list[str]:
-    """The units that the end of a column's name can be read as: one, several, or none."""
+    """The units that fit the ending of a column's name: one, several, or none."""
     known = units_at_the_end(name)
     longest = max((unit_suffix(unit) for unit in known), key=len, default="")
     units = [unit for unit in known if unit_suffix(unit) == longest]

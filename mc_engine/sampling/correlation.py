@@ -1,8 +1,8 @@
 """Rank (Spearman) correlation between dispersions, imposed on their uniform numbers before the quantile functions.
 
-`gaussian_copula` works case by case and serves the designs that can be extended; `iman_conover` re-pairs a whole Latin
-hypercube, which keeps its strata.  Both leave the first column, and every dispersion without a correlation, as they
-were; both aim at rank correlations, so the distributions may be anything.
+`gaussian_copula` works case by case, and is for designs that can be extended.  `iman_conover` reorders the columns of a
+whole Latin hypercube, which keeps its strata.  Neither changes the first column or a dispersion without a correlation.
+Rank correlations do not depend on the distributions, so these may be any.
 """
 
 import math
@@ -24,9 +24,9 @@ def normal_correlation(rank: np.ndarray) -> np.ndarray:
 
 
 def group_matrix(names: Sequence[str], pairs: Iterable[tuple[str, str, float]]) -> tuple[tuple[int, ...], np.ndarray]:
-    """(members, matrix): places in `names` of all correlated ones, in that order, and their rank correlations.
+    """(members, matrix): indices in `names` of all correlated ones, in that order, and their rank correlations.
 
-    Pairs that are not mentioned are uncorrelated.
+    Pairs that are not given are uncorrelated.
     """
     pairs = list(pairs)
     touched = {name for first, second, _ in pairs for name in (first, second)}
@@ -44,7 +44,7 @@ def correlated(
     names: Sequence[str],
     pairs: Iterable[tuple[str, str, float]],
 ) -> list[np.ndarray]:
-    """The columns, those of correlated names as the method returns them: `gaussian_copula` or `iman_conover`."""
+    """The columns, with those of correlated names changed by `method`, `gaussian_copula` or `iman_conover`."""
     members, matrix = group_matrix(names, pairs)
     if members:
         for place, column in zip(members, method([columns[place] for place in members], matrix), strict=True):
@@ -66,7 +66,7 @@ def _factor(rank_matrix: np.ndarray) -> np.ndarray:
 
 
 def _mix(factor: np.ndarray, columns: list[np.ndarray]) -> list[np.ndarray]:
-    """factor @ columns, row by row.  A library product would round differently for one case than for many."""
+    """factor @ columns, row by row, because a library's product rounds differently for one case and for many."""
     mixed = []
     for row in range(len(columns)):
         total = factor[row, 0] * columns[0]
@@ -77,7 +77,7 @@ def _mix(factor: np.ndarray, columns: list[np.ndarray]) -> list[np.ndarray]:
 
 
 def gaussian_copula(u: list[np.ndarray], rank_matrix: np.ndarray) -> list[np.ndarray]:
-    """Uniform numbers with these rank correlations, from independent ones, each case for itself."""
+    """Uniform numbers with these rank correlations, from independent ones; each case separately."""
     from scipy.special import ndtr, ndtri
 
     factor = _factor(rank_matrix)
@@ -88,7 +88,7 @@ def gaussian_copula(u: list[np.ndarray], rank_matrix: np.ndarray) -> list[np.nda
 
 
 def iman_conover(u: list[np.ndarray], rank_matrix: np.ndarray) -> list[np.ndarray]:
-    """The columns of a whole design re-paired to these rank correlations; each keeps its own set of values.
+    """The columns of a whole design, reordered to these rank correlations; each keeps its set of values.
 
     Needs more cases than columns.
     Iman & Conover, A distribution-free approach to inducing rank correlation among input variables, Commun.

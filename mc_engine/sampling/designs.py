@@ -1,8 +1,8 @@
-"""Designs: where the cases of a campaign lie in the unit cube, or on the axes of a grid.
+"""Designs: the points of a campaign's cases in the unit cube, or their levels on the axes of a grid.
 
-Random designs give one uniform number per (dispersion, case); a dispersion's place in the file is its
-dimension.  Designs in blocks do so too, but their cases belong together: Saltelli's blocks for Sobol' indices, Morris's
-trajectories for elementary effects.  Designs by levels give, per dispersion, the level that each case takes.
+Random designs give one uniform number per (dispersion, case); the n-th dispersion of the file is the n-th dimension.
+Designs in blocks do so too, but the cases of a block belong together: Saltelli's blocks for Sobol' indices, Morris's
+trajectories for elementary effects.  Designs by levels give, per dispersion, the level of each case.
 """
 
 from collections.abc import Mapping, Sequence
@@ -60,7 +60,7 @@ def block_size(design: str, n_dispersions: int) -> int:
 
 
 def block_problem(design: str, n_dispersions: int, n_cases: int) -> str:
-    """Why a design cannot have so many cases, as a sentence; empty if it can."""
+    """Why a design cannot have this number of cases, as a sentence; empty if it can."""
     if n_cases > MOST_CASES:
         return f"{n_cases} is not allowed; it must be at most {MOST_CASES}"
     if design not in IN_BLOCKS or not n_dispersions or n_cases % block_size(design, n_dispersions) == 0:
@@ -74,7 +74,7 @@ def block_problem(design: str, n_dispersions: int, n_cases: int) -> str:
 
 
 def extension_problem(manifest: Mapping[str, Any], has: int, cases: int) -> str:
-    """Why a run of `has` cases cannot get so many, as far as its manifest says; empty if it can."""
+    """Why a run with `has` cases cannot be extended to `cases`, as a sentence; empty if its manifest allows it."""
     design = manifest["campaign"]["design"]
     if manifest.get("upstream") is not None:
         return "takes its inputs from another run; extend that one, and fly this campaign anew"
@@ -107,7 +107,7 @@ def _saltelli(seed: int, names: Sequence[str], block: np.ndarray, row: np.ndarra
 def _morris(seed: int, names: Sequence[str], block: np.ndarray, row: np.ndarray) -> list[np.ndarray]:
     """Trajectories: from a random point of a grid one input after the other, in random order, moves by half the levels.
 
-    The levels are the middles of MORRIS_LEVELS equal parts of the unit interval, so that none is infinite.
+    The levels are the middles of MORRIS_LEVELS equal parts of the unit interval, so that no quantile is infinite.
     Morris, Technometrics 33 (1991), 161-174, with 4 levels and steps of 2, up or down.
     """
     draws = [uniforms(seed, f"{name}/morris order", block) for name in names]
@@ -141,7 +141,7 @@ def level_count(design: str, sizes: Sequence[int]) -> int:
 
 
 def grid_levels(sizes: Sequence[int], case_ids: np.ndarray) -> list[np.ndarray]:
-    """int64[n] per dispersion: the level of each case on a full grid, the last dispersion running fastest."""
+    """int64[n] per dispersion: the level of each case on a full grid; the last dispersion varies fastest."""
     levels = []
     rest = np.asarray(case_ids, dtype=np.int64)
     for size in reversed(sizes):

@@ -1,7 +1,7 @@
-"""Probability distributions as quantile functions: a uniform number in, a value out.
+"""Probability distributions as quantile functions: from a uniform number to a value.
 
-Every draw is `quantiles(distribution, u)`, so any design of the unit cube serves any distribution, and
-truncation cuts the distribution: F^-1(F(lower) + u (F(upper) - F(lower))).  Bounds never pile draws up.
+Every draw is `quantiles(distribution, u)`, so any design in the unit cube works with any distribution.  Truncated
+draws are F^-1(F(lower) + u (F(upper) - F(lower))), so they never accumulate at a bound.
 
 `cdf` and `sf` (its complement) take one number and need no scipy, so that a campaign file is checked fast.
 """
@@ -25,35 +25,35 @@ class Distribution(ABC):
     @property
     @abstractmethod
     def support(self) -> tuple[float, float]:
-        """Lowest and highest possible value; infinite where the distribution does not end."""
+        """Lowest and highest possible value; infinite for an unbounded tail."""
 
     @property
     def span(self) -> tuple[float, float]:
-        """The low and high value that a design by levels uses: the support, or three sigma where it has no end."""
+        """Lowest and highest level in a design by levels: the support, or three sigma where it is unbounded."""
         return self.support
 
     @abstractmethod
     def ppf(self, u: np.ndarray) -> np.ndarray:
-        """Values below which the share u, 0 < u < 1, lies."""
+        """Quantiles: the values at the cumulative probabilities u, 0 < u < 1."""
 
 
 class Continuous(Distribution):
-    """A distribution that may be cut: it knows both of its tails to full relative accuracy."""
+    """A distribution that may be truncated: both of its tails are computed to full relative accuracy."""
 
     @abstractmethod
     def cdf(self, x: float) -> float:
-        """Share below x."""
+        """Probability of a value below x."""
 
     @abstractmethod
     def sf(self, x: float) -> float:
-        """Share above x."""
+        """Probability of a value above x."""
 
     @abstractmethod
     def isf(self, q: np.ndarray) -> np.ndarray:
-        """Values above which the share q lies."""
+        """The values that are exceeded with the probabilities q."""
 
     def share_between(self, lower: float, upper: float) -> float:
-        """Share of the distribution within [lower, upper], accurate in either tail."""
+        """Probability of a value within [lower, upper], accurate in either tail."""
         if self.cdf(lower) < 0.5:
             return self.cdf(upper) - self.cdf(lower)
         return self.sf(lower) - self.sf(upper)
@@ -140,7 +140,7 @@ class Lognormal(Continuous):
 
 @dataclass(frozen=True)
 class Exponential(Continuous):
-    """Nothing below `origin`, then a share falling by e every `scale`; the mean is origin + scale."""
+    """Exponential density from `origin` on, falling by the factor e every `scale`; the mean is origin + scale."""
 
     origin: float
     scale: float
@@ -168,7 +168,7 @@ class Exponential(Continuous):
 
 @dataclass(frozen=True)
 class Truncated(Distribution):
-    """`base` given that the value lies within [lower, upper], which must hold a positive share of it."""
+    """`base` conditional on a value within [lower, upper], which must have a positive probability."""
 
     base: Continuous
     lower: float
@@ -198,7 +198,7 @@ class Truncated(Distribution):
 
 @dataclass(frozen=True)
 class Uniform(Distribution):
-    """The same density everywhere from lower to upper."""
+    """Constant density from lower to upper."""
 
     lower: float
     upper: float
@@ -213,7 +213,7 @@ class Uniform(Distribution):
 
 @dataclass(frozen=True)
 class Triangular(Distribution):
-    """Density that rises in a straight line from lower to mode, and falls in one to upper."""
+    """Density that rises linearly from lower to mode, and falls linearly from there to upper."""
 
     lower: float
     mode: float
@@ -232,7 +232,7 @@ class Triangular(Distribution):
 
 @dataclass(frozen=True)
 class Beta(Distribution):
-    """Density (x - lower)^(alpha - 1) (upper - x)^(beta - 1), up to its factor."""
+    """Density proportional to (x - lower)^(alpha - 1) (upper - x)^(beta - 1)."""
 
     alpha: float
     beta: float
@@ -251,7 +251,7 @@ class Beta(Distribution):
 
 @dataclass(frozen=True)
 class Discrete(Distribution):
-    """One of `values` with its weight; words and switches as well as numbers.  Quantiles go in the order written."""
+    """One of `values` with its weight; numbers, words or switches.  Quantiles follow the order of `values`."""
 
     values: tuple[Scalar, ...]
     weights: tuple[float, ...]
@@ -270,7 +270,7 @@ class Discrete(Distribution):
 
 @dataclass(frozen=True)
 class Empirical(Distribution):
-    """Measured values, sorted, each as likely as the next; draws repeat them and invent none between."""
+    """Measured values, sorted, with equal probabilities; draws are these values, without interpolation."""
 
     values: tuple[float, ...]
 
@@ -306,14 +306,14 @@ class Constant(Distribution):
 
 
 def truncate(distribution: Continuous | Truncated, lower: float, upper: float) -> Truncated:
-    """The distribution cut to [lower, upper], or further cut where it was cut before."""
+    """The distribution truncated to [lower, upper]; one that is truncated already is truncated further."""
     if isinstance(distribution, Truncated):
         return Truncated(distribution.base, max(lower, distribution.lower), min(upper, distribution.upper))
     return Truncated(distribution, lower, upper)
 
 
 def share_outside(distribution: Continuous | Truncated, low: float, high: float) -> float:
-    """Share of the draws that would fall outside [low, high]."""
+    """Probability of a draw outside [low, high]."""
     if isinstance(distribution, Continuous):
         return distribution.cdf(low) + distribution.sf(high)
     base, lower, upper = distribution.base, distribution.lower, distribution.upper
@@ -326,7 +326,7 @@ def share_outside(distribution: Continuous | Truncated, low: float, high: float)
 def quantiles(distribution: Distribution, u: np.ndarray) -> np.ndarray:
     """The values at uniform numbers u, float64[n] in [0, 1]: float64[n], or bool[n], or object[n] of words.
 
-    The ends 0 and 1 are moved inwards by less than their own rounding, so that no draw is infinite.
+    0 and 1 are moved inwards by less than their rounding, so that no draw is infinite.
     """
     return distribution.ppf(np.clip(u, 2.0**-54, 1.0 - 2.0**-53))
 

@@ -3,9 +3,9 @@
 Salmon, Moraes, Dror & Shaw, Parallel random numbers: as easy as 1, 2, 3, SC'11, section 3.3.  NumPy's generator steps
 its counter before the first block, hence the 1 in the lowest word.
 
-The first numbers of a process are computed with NumPy, later ones by machine code that LLVM makes in some milliseconds:
-the processor has the product of two 64-bit words with all its bits, which NumPy has not, so that it takes a tenth of
-the time, and does not hold the interpreter lock.  Both give the same bits.
+The first numbers of a process are computed with NumPy, later ones by machine code that LLVM makes in some milliseconds.
+The processor computes the full product of two 64-bit words, which NumPy cannot, so the machine code takes a tenth of
+the time; it does not hold the interpreter lock.  Both give the same bits.
 """
 
 import ctypes

@@ -1,7 +1,7 @@
-"""Random numbers by address: every draw is a function of (seed, name, case) and of nothing else.
+"""Random numbers by address: every draw is a function of (seed, name, case) alone.
 
-Adding a dispersion, a case or a worker leaves every other number as it was.  Changing any function here is
-a new seed contract: raise SEED_CONTRACT and say so in the change log.
+Another dispersion, case or worker does not change any other number.  A change of any function here is a new seed
+contract: raise SEED_CONTRACT and say so in the change log.
 """
 
 import hashlib
@@ -21,7 +21,7 @@ def stream_key(seed: int, name: str) -> np.ndarray:
 
 
 def stream(seed: int, name: str, case_id: int) -> np.random.Generator:
-    """Generator for one named quantity of one case, reachable without drawing the others."""
+    """NumPy generator for one named quantity of one case, independent of all other draws."""
     # The case is the top word: 2**192 blocks per case before two cases could meet.
     return np.random.Generator(np.random.Philox(key=stream_key(seed, name), counter=[0, 0, 0, case_id]))
 
