@@ -1,9 +1,8 @@
-"""What cases of a simulator leave in a run directory: rows that no part holds yet, and folders of failed cases.
+"""Files of a simulator's cases in a run directory: rows that are not yet in a part, and folders of failed cases.
 
-A case of a simulator may take minutes, and a part holds many; with its row recorded, a killed run does not fly it
-again.  Each row is a line of a file of its part, with a check sum; the file is removed when the part is written.  A
-row is on the disk as soon as the system writes it, which a kill of the engine does not prevent; a power cut may cost
-the last rows, which are then flown again.
+A case of a simulator may take minutes, and a part contains many.  Because its row is recorded, a resumed run does not
+fly it again.  Each row is a line, with a checksum, in a file for its part; the file is removed when the part is
+written.  Rows survive a kill of the engine.  A power cut may lose the last rows, which are then flown again.
 """
 
 import json
@@ -30,7 +29,7 @@ _NAME = re.compile(r"\.rows-(-1|[0-9]{1,18})-([0-9]{1,18})\.tmp")
 class RowLog:
     """The rows of the cases first .. stop - 1 of a run.
 
-    The process that flies a case records its row, before it tells anybody and before it flies the next.
+    The process that flies a case records its row before it reports the case and before it flies the next one.
     """
 
     def __init__(self, run: Path, first: int, stop: int, case_ids: np.ndarray | None = None):
@@ -129,7 +128,7 @@ def _mark(text: bytes) -> bytes:
 
 
 def keep_case(run: Path, name: str, folder: Path, texts: Mapping[str, bytes], most: int | None = MOST_KEPT) -> None:
-    """Keep what a case left behind, in place of what an earlier flight of it did.
+    """Keep the files of a case, in place of those of an earlier flight of it.
 
     name : of its folder in the run.  folder : of its files, of which the regular ones are copied; it may be missing.
     texts : contents of further files by name.  most : folders that a run may have, or None.

@@ -27,16 +27,16 @@ def rows_to_keep(record: np.ndarray, rows: int, lines: slice = slice(None), n_ro
     """Indices of the rows of a recorded flight that its history holds, ascending: int64[n_kept].
 
     record : float64[n_lines, n], contiguous; a column is a row of the history.  lines : of this flight, the time, not
-        falling, and its quantities; by default all.  n_rows : recorded; by default n.  Rows of one time are one
-        instant: two before and after a sample of the control, three or more before and after an event.
-    rows : how many are kept.  The first and the last are, both sides of every event, and both sides of the samples at
-        which a quantity jumps by more than a hundredth of its range: up to twice `rows` of them, the largest.  The rest
-        lie where straight lines between them err most, a fifth evenly in time; they are half of `rows` at least, on top
-        of the others where events and samples are so many.
+        decreasing, and its quantities; by default all.  n_rows : recorded; by default n.  Rows at the same time are one
+        instant: two before and after a control sample, three or more before and after an event.
+    rows : number of rows to keep.  Always kept are the first and the last row, both sides of every event, and both
+        sides of samples at which a quantity jumps by more than a hundredth of its range, up to twice `rows` of these,
+        the largest.  The others are where linear interpolation between them has the largest errors, and a fifth of them
+        evenly in time.  They are at least half of `rows`, in addition to the others if events and samples are many.
 
-    A row that repeats the one before counts as none.  All rows are kept where there are no more.
-    The density of the rest is that of C. de Boor, A Practical Guide to Splines, 1978, chapter XII: the square root of
-    the second derivative, here of the quantity that bends most in units of its range.
+    Rows that repeat the one before are not counted.  All rows are kept if there are no more than wanted.
+    The density of the others is that of C. de Boor, A Practical Guide to Splines, 1978, chapter XII: the square root of
+    the second derivative, here of the quantity with the largest one in units of its range.
     """
     first, stop, _ = lines.indices(len(record))
     n = record.shape[1] if n_rows is None else n_rows

@@ -147,7 +147,7 @@ class _Upstream(_Campaign):
 
 
 class _Imported(Record):
-    """Tables that the cases were read from, where the engine did not fly them."""
+    """Tables from which the cases were read, for runs that the engine did not fly."""
 
     file: str
     history: str | None = None

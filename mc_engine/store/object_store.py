@@ -43,7 +43,7 @@ PATIENCE = 10.0  # the wait after a copy, in multiples of the time that the copy
 
 @dataclass(frozen=True)
 class Publication:
-    """What was sent to `url`: names of files and number of bytes; kept : number of files that were there already."""
+    """Result of `publish`: names of files and number of bytes sent; kept : number of files that were there already."""
 
     url: str
     sent: tuple[str, ...]

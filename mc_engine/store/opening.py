@@ -11,7 +11,7 @@ def open_store(path: str | Path) -> Store:
 
     path : str or Path
 
-    Returns a Store.  It is open for reading; methods that write take the directory's lock.
+    Returns a Store, for reading; its methods that write take the lock of the directory.
 
     Raises StoreError if there is no run, or it is damaged.
 

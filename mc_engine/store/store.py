@@ -83,7 +83,7 @@ def create_store(
 
 
 def refuse_occupied(path: Path, companions: Iterable[str] = ()) -> None:
-    """StoreError if `path` holds a run or any other files, so that no new run can be made there.
+    """StoreError if `path` contains a run or any other files, so that no new run can be made there.
 
     companions : names of files that an interrupted attempt may have left there.
     """
@@ -98,10 +98,10 @@ def refuse_occupied(path: Path, companions: Iterable[str] = ()) -> None:
 
 
 class Store:
-    """A run directory: the case table, the saved time histories, and the journal that says which of them count.
+    """A run directory: the case table, the saved time histories, and the journal that records the valid files.
 
-    Its methods raise StoreError for what is not there or is damaged.  A Store is for one thread, and one process at a
-    time may write.  Ranges of cases are half open: (first, stop).
+    Its methods raise StoreError for missing or damaged data.  A Store is for one thread, and one process at a time may
+    write.  Ranges of cases are half open: (first, stop).
 
     path : Path, the run directory; `open_store` also takes the URL of a published run
 
@@ -174,7 +174,7 @@ class Store:
 
     @property
     def parts(self) -> list[Part]:
-        """Receipts of all committed parts, by their first case."""
+        """Receipts of all committed parts, in the order of their first case."""
         return list(self._counted.parts)
 
     @property
@@ -206,7 +206,7 @@ class Store:
         return self._counted.committed()
 
     def missing(self, cases: int | range | None = None) -> list[Range]:
-        """The ranges that are not committed among `cases`: so many first ones, a range, or None for all expected."""
+        """The ranges that are not committed; cases : the first n, a range, or None for all of this directory."""
         expected = self.wanted if cases is None else cases if isinstance(cases, range) else range(cases)
         return self._counted.missing(expected)
 
@@ -219,7 +219,7 @@ class Store:
         return counts
 
     def lost_files(self) -> list[str]:
-        """Names of committed parts and of folders that are missing; `verify` finds all other damage, too."""
+        """Names of committed parts and of folders that are missing; `verify` also finds all other damage."""
         files = [*PART_FOLDERS, *(part.file for part in self._counted.all_parts())]
         return [file for file in files if not (self.path / file).exists()]
 
@@ -273,8 +273,8 @@ class Store:
     def lock(self) -> Iterator["Store"]:
         """Hold the writer lock of this directory within the block; blocks may be nested.
 
-        First the complete parts that a killed writer left are committed, and its other files removed.  StoreError if
-        another process is writing.
+        At its start, the complete parts that a killed writer left are committed, and its other files are removed.
+        StoreError if another process is writing.
         """
         if self._lock.held:
             self._lock.check()
@@ -320,7 +320,7 @@ class Store:
     def publish(self, *written: Written) -> None:
         """Commit parts that workers wrote by `parts.write_aside`; on return they survive a power cut.
 
-        The disk is waited for once for the names of all, and once for the journal lines of a page.
+        The names of all parts are synced together, and so are the journal lines of a page.
         """
         with self.lock():
             if written[0].part.file == NOMINAL:
