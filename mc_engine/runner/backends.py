@@ -107,10 +107,10 @@ def _refuse_no_address(scheduler: str) -> None:
 
 
 def flyer_on(backend: str, campaign: Campaign) -> Flyer:
-    """What flies the cases of a campaign on a backend: the processor, but for "cuda" a card.
+    """The `Flyer` of a campaign on a backend: on the processor, or for "cuda" on a card.
 
-    "auto" takes a card only for a model that `bench --card` found to be faster on the cards of this machine.
-    Raises EngineError, one sentence, where a card is asked for and cannot fly them.
+    "auto" uses a card only for a model that `bench --card` found to be faster on the cards of this machine.
+    Raises EngineError, one sentence, if a card is requested and cannot fly the cases.
     """
     compiled = not isinstance(campaign.model, Simulator)
     if backend == "cuda" and not compiled:
@@ -141,10 +141,10 @@ _FIRST_TRIAL, _LONG_ENOUGH = 1024, 0.25  # cases; s: to begin threads takes some
 
 
 def measure_card(campaign: Campaign, n_cases: int | None = None) -> tuple[float, float]:
-    """Cases per second on all cores of the processor and on a card, which the backend "auto" goes by from now on.
+    """Cases per second on all cores of the processor and on a card; the backend "auto" uses the result from then on.
 
-    n_cases : of a flight; by default so many that all cores fly for a while, or all cases of a design that has no more.
-    The fastest of three flights counts.  Raises EngineError, one sentence, where there is no card.
+    n_cases : of a flight; by default enough for all cores to fly for a while, or all cases of a design with fewer.
+    The fastest of three flights counts.  Raises EngineError, one sentence, if there is no card.
     """
     from mc_engine.runner.cards import CardFlyer
 
@@ -189,7 +189,7 @@ def shortest(flight: Callable[[], object], repeats: int) -> float:
 
 
 def _measurement_of(campaign: Campaign) -> Path:
-    """What is kept for a model with its sources on the cards and cores of this machine."""
+    """The file of the measurement for a model with its sources on the cards and cores of this machine."""
     from mc_engine.runner.cards import cards
 
     about = [flyer_of(campaign).digest(), str(os.cpu_count()), *(card.name for card in cards())]

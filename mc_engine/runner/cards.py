@@ -1,8 +1,9 @@
-"""Compiled models flown on NVIDIA cards.  Tests fly them with a stand-in for the driver, or on a card where one is.
+"""Compiled models flown on NVIDIA cards.  Tests use a substitute for the driver, or a card if there is one.
 
-Every flight has a stream, a block of the card's memory and one of the host's that the card reads by itself ("pinned"),
-both with the same layout: what is copied to the card, then what comes back.  Threads that fly at the same time have a
-stream each, so that the copies of one flight run while another computes.  Blocks are kept for the next flight.
+Every flight has a stream, a block of the card's memory, and a block of host memory that the card reads directly
+("pinned").  Both blocks have the same layout: inputs copied to the card, then results copied back.  Threads that fly at
+the same time have a stream each, so that the copies of one flight run while another computes.  Blocks are kept for the
+next flight.
 """
 
 import ctypes
@@ -216,10 +217,10 @@ def _card_kernel(model: Model, folder: Path | None, width: int) -> Callable[...,
 
 
 class CardFlyer(CompiledFlyer):
-    """A compiled model, one case a thread.  Time histories fly on the processor.
+    """A compiled model, one case per thread of a card.  Time histories are flown on the processor.
 
-    A card flies thousands of cases in the time of one, so the chunks are as large as they may be.  In larger ones
-    there is less to do for each case in the interpreter, for which the worker threads wait in turn.
+    A card flies thousands of cases in the time of one, so chunks are as large as possible.  Larger chunks also need
+    less time per case in the interpreter, for which the worker threads wait in turn.
     """
 
     chunks_per_worker, largest_chunk = 1, 131_072

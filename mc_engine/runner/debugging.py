@@ -1,7 +1,7 @@
-"""One case flown by Python, which stops in the debugger of the user's choice, in the lines of the model's physics.
+"""One case flown by Python, which stops in the user's debugger, in a line of the model's physics.
 
-A debugger stops in the function that calls `breakpoint()`.  So a function of the model in which a flight is to stop is
-replaced, while it flies, by the same function with one statement more: `if due: breakpoint()`.
+A debugger stops in the function that calls `breakpoint()`.  Therefore a function of the model in which a flight is to
+stop is replaced, during the flight, by the same function with one more statement: `if due: breakpoint()`.
 """
 
 import ast
@@ -32,12 +32,12 @@ from mc_engine.status import STATUS_NAME
 
 @dataclass(frozen=True)
 class Stop:
-    """Where a flight is to stop; the first call of `rhs` where nothing is named.
+    """Where a flight is to stop; by default in the first call of `rhs`.
 
     time : [s], in the first call of `rhs` at this time or later
-    event : name of the event in whose wake it stops: in `switch`, in the right-hand side that follows where the model
-        has none, or in `observe` and `evaluate` where it ends the case
-    not_finite : at the line whose number broke the flight, or made a metric not a number
+    event : name of the event after which it stops: in `switch`, in the next right-hand side if the model has no
+        `switch`, or in `observe` and `evaluate` if the event ends the case
+    not_finite : at the line whose result ended the flight as not finite, or made a metric NaN
     """
 
     time: float | None = None
@@ -47,7 +47,7 @@ class Stop:
 
 @dataclass
 class Debugged:
-    """How a debugged flight ended: its status, its end [s], its metrics in declared units, whether it met the stop."""
+    """How a debugged flight ended: status, end time [s], metrics in declared units, whether it reached the stop."""
 
     status: str
     end_time: float

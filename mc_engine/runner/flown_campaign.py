@@ -66,7 +66,7 @@ def campaign_of(store: "Store", directory: Path | None = None) -> Campaign:
 
 
 def _other_sources(flown: str | None, present: str) -> str:
-    """Why a run of other sources is refused, and the remedy.  flown, present : versions of the engine."""
+    """Why a run with other sources is refused, and the remedy.  flown, present : versions of the engine."""
     if flown in (None, present):
         return "was flown by other sources of engine or model; run the campaign anew"
     return f"was flown by mc-engine {flown}, and this is {present}; use that version, or run the campaign anew"

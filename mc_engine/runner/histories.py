@@ -1,4 +1,4 @@
-"""Cases flown once more: the chosen ones, sampled over time, for their histories; the first ones with finer steps."""
+"""Repeated flights of a run's cases: chosen ones for their time histories, the first ones with finer steps."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -64,10 +64,10 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
 
 
 def integration_changes(store: Store, campaign: Campaign) -> dict[str, Any] | None:
-    """How a finer integration changes the metrics of a run's first cases; None of a shard, companion or simulator.
+    """How a finer integration changes the metrics of a run's first cases; None for a shard, companion or simulator.
 
-    by : what is finer, in words.  tried : cases, used : those that complete both ways, with the same metrics.
-    changes : by metric the largest of these, in its unit; a metric that none of them has is left out.
+    by : what is finer, in words.  tried : cases; used : those that complete in both flights, with the same metrics.
+    changes : by metric the largest change, in its unit; without metrics that none of the cases has.
     """
     if len(store.wanted) < store.n_cases or "sensitivity" in store.manifest or isinstance(campaign.model, Simulator):
         return None

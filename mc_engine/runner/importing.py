@@ -1,7 +1,7 @@
-"""Results that were flown elsewhere, made a run directory that is reported, compared and judged like any other.
+"""Import of results computed elsewhere into a run directory, which is reported, compared and judged like any other.
 
-The table has a row for each case of the campaign: `case_id`, the dispersed inputs, the metrics, and where there are
-any `status` and `reason`.  `mc-engine sample` gives the inputs; those in the table are compared with them.
+The table has a row for each case of the campaign: `case_id`, the dispersed inputs, the metrics, and optionally `status`
+and `reason`.  The inputs in the table must agree with those of `mc-engine sample`.
 """
 
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ _MOST = 20  # problems of one table
 
 
 def import_results(campaign: Campaign, file: Path, out: Path, history: Path | None = None) -> Store:
-    """Make `out` a run of the campaign from the table in `file`, Parquet or CSV.
+    """Make the run directory `out` for a campaign from the table in `file`, Parquet or CSV.
 
     A row with the case_id -1 is the nominal case.  history : table of case_id, t_s and the outputs.
     Raises CampaignError with every mistake of the tables.

@@ -1,4 +1,4 @@
-"""Bounds of the parts that are missing: in line with the run's other parts, or as a lost part had them.
+"""Bounds of the missing parts: aligned with the other parts of the run, or those of a lost part.
 
 A run that was interrupted, repaired, merged or extended therefore has the same part files as one that was not.
 """

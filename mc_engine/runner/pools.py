@@ -4,8 +4,8 @@ Workers write the parts themselves; only tasks and results travel between proces
 
     threading   threads: no start-up time and no copies; a crash in model code ends the run
     loky        processes: a crash ends one worker only; limits on time and memory can be set
-    cuda        threads that have the cases of a compiled model flown by NVIDIA cards
-    auto        as cuda where that was measured to be faster, otherwise as threading
+    cuda        threads that let NVIDIA cards fly the cases of a compiled model
+    auto        cuda if it was measured to be faster, otherwise threading
     dask        processes of a `distributed` scheduler, which dask-jobqueue starts on SLURM, PBS or LSF
 """
 

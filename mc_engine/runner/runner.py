@@ -43,15 +43,15 @@ THREADS = Backend()
 
 @dataclass(frozen=True)
 class Replay:
-    """One case flown again, and whether every number of it came out as stored.
+    """The result of `replay`: one case flown again, and whether its numbers equal the stored ones.
 
-    equal : bool, every stored number has the same bits, or lies within `tolerance`
-    differences : tuple of str, a sentence for each number that does not
-    history : DataFrame, the flight: case_id, t_s and the model's outputs
-    row : dict, the stored line of the case table, by column name
-    lost : str, file, line and values of what made the state or a metric not finite; empty where all are finite
-    tolerance : float, fraction by which numbers were allowed to differ, that of a simulator which is not
-        deterministic; None where bits were compared
+    equal : bool, every stored number has the same bits, or is within `tolerance`
+    differences : tuple of str, a sentence for each number that differs
+    history : DataFrame, the time history: case_id, t_s and the model's outputs
+    row : dict, the stored row of the case table, by column name
+    lost : str, file, line and values of what made the state or a metric infinite or NaN; empty if all are finite
+    tolerance : float, allowed relative difference, that of a simulator which is not deterministic; None if bits were
+        compared
 
     >>> again = replay("runs/small", 3)
     >>> again.equal, list(again.history)
@@ -79,18 +79,18 @@ def run(
     """Run a campaign and store every case in the new directory `out`.
 
     campaign : Campaign, from `load_campaign`
-    out : str or Path, must not exist or be empty; runs/<campaign>-<UTC time> by default
+    out : str or Path, must not exist, or be empty; runs/<campaign>-<UTC time> by default
     progress : function of (cases done, cases wanted, cases failed), called after each chunk
-    workers : int, threads or processes; all cores by default
-    chunk : int, cases that a worker flies at a time
+    workers : int, number of threads or processes; one per core by default
+    chunk : int, number of cases that a worker flies at a time
     backend : Backend, or its name: "threading", "loky" (processes: a crash in model code is isolated), "dask",
         "cuda" (NVIDIA cards), or "auto"
     shard : Shard, fly only these cases; `mc_engine.runner.runner.merge` joins the shards
 
-    Returns the Store, complete.  Its rows do not depend on workers, chunk and backend.  Where the campaign takes inputs
+    Returns the complete Store.  Its rows do not depend on workers, chunk and backend.  If the campaign takes inputs
     from another one that has yet to be flown, that one is flown first, into a directory next to `out`.
 
-    Raises StoreError if `out` is occupied or a URL, and RunInterrupted on Ctrl-C or a full disk; complete chunks are
+    Raises StoreError if `out` is occupied or a URL, and RunInterrupted on Ctrl-C or a full disk; completed chunks are
     kept, and `resume` flies the rest.  Raises ModelError if the model is at fault; if no case has completed, `out` is
     removed, so that the same call flies the corrected model.
 
@@ -166,9 +166,9 @@ def resume(
     workers : int, threads or processes; all cores by default
     chunk : int, cases that a worker flies at a time
     backend : Backend, or its name, as for `run`
-    repair : bool, fly damaged parts again, too
+    repair : bool, also fly the cases of damaged parts again
 
-    Returns the Store, complete.
+    Returns the complete Store.
 
     Raises StoreError if the model or the engine's sampling has changed since the run began, and RunInterrupted as `run`
     does.
@@ -191,19 +191,19 @@ def extend(
     chunk: int | None = None,
     backend: Backend | str = THREADS,
 ) -> Store:
-    """Give a run more cases; those it has stay as they are.
+    """Add cases to a run; its present cases stay as they are.
 
     path : str or Path, the run directory
-    cases : int, the number of cases that it is to have in all
+    cases : int, the new total number of cases
     progress : function of (cases done, cases wanted, cases failed), called after each chunk
     workers : int, threads or processes; all cores by default
     chunk : int, cases that a worker flies at a time
     backend : Backend, or its name, as for `run`
 
-    Returns the Store, complete.  Its cases are those of a campaign that had this number from the start.
+    Returns the complete Store.  Its cases equal those of a run with this number of cases from the start.
 
-    Raises StoreError if the design cannot be extended or the run has as many cases, CampaignError if the number does
-    not fit the blocks of the design, and RunInterrupted as `run` does.
+    Raises StoreError if the design cannot be extended or the run already has as many cases, CampaignError if the number
+    does not fit the blocks of the design, and RunInterrupted as `run` does.
 
     >>> extend("runs/small", 12).n_cases
     12
@@ -228,7 +228,7 @@ def rerun(
 ) -> Store:
     """Fly the failed cases of a complete run again, for example after their worker was killed.
 
-    All other rows stay.  A case that failed because of its physics fails again, with the same bits.
+    All other rows stay as they are.  A case that failed because of its physics fails again, with the same bits.
     """
     store = open_store(path)
     return fly_failed(store, campaign_of(store), session_of(progress, workers, None, backend))
@@ -242,7 +242,7 @@ def merge(
     workers: int | None = None,
     chunk: int | None = None,
 ) -> Store:
-    """Join the run directories of all shards of a campaign in the new run directory `out`.
+    """Join the run directories of all shards of a campaign in the new run directory `out`; returns its Store.
 
     StoreError if cases are missing, or if the shards are not of one campaign; see `mc_engine.runner.shards`.
     """
@@ -251,14 +251,14 @@ def merge(
 
 
 def replay(path: str | Path, case_id: int) -> Replay:
-    """Fly one case of a run again, alone, and compare every stored number bit for bit.
+    """Fly one case of a run again and compare every stored number bit for bit.
 
     The numbers of a simulator that is not deterministic are compared within its `tolerance`.
 
     path : str or Path, the run directory
     case_id : int, number of the case, from 0
 
-    Returns a Replay, with the history of the flight.
+    Returns a Replay, with the time history of the flight.
 
     Raises StoreError if there is no such case, or if the model or the engine's sampling has changed since.
 

@@ -1,4 +1,4 @@
-"""One session on a run directory: flies what is missing until the run is complete or is stopped.
+"""One session on a run directory: flies the missing cases until the run is complete or stopped.
 
 One process at a time is the writer of a run; it commits the parts that the workers of its pool wrote.
 """
@@ -58,7 +58,7 @@ class Session:
 def session_of(
     progress: ProgressCall | None, workers: int | None, chunk: int | None, backend: Backend | str
 ) -> Session:
-    """A session from the arguments of the runner's functions; EngineError for one that nothing can be flown with."""
+    """A session from the arguments of the runner's functions; EngineError for an invalid argument."""
     workers = (os.cpu_count() or 1) if workers is None else count_of("workers", workers)
     chunk = None if chunk is None else min(count_of("chunk", chunk), MOST_CASES)
     if progress is not None and not callable(progress):
@@ -122,7 +122,7 @@ def _has_companion(store: Store, campaign: Campaign) -> bool:
 
 
 def _counting(session: Session, flown: int, cases: int, failed: int = 0) -> Session:
-    """The session whose progress also counts `cases` of another stage, of which so many are flown and failed."""
+    """The session whose progress also counts the `cases` of another stage, of which `flown` and `failed` are done."""
     report = session.progress
     if report is None:
         return session
@@ -155,7 +155,7 @@ def _as_writer(store: Store, campaign: Campaign, command: str, session: Session)
 
 
 def fly_failed(store: Store, campaign: Campaign, session: Session) -> Store:
-    """Fly the cases again that did not complete, and such a nominal; what comes out the same is not replaced."""
+    """Fly the failed cases again, and a failed nominal case; identical results are not replaced."""
     if store.missing():
         resume = f"`mc-engine resume {shell_word(store.path)}`"
         raise StoreError(f"{store.path}: is not complete; {resume} flies the rest first")

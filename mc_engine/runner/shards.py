@@ -1,7 +1,7 @@
 """Shards: independent pieces of a campaign, for example for the job array of a cluster.
 
-Shard k of n holds the k-th n-th of the cases in its own run directory.  The merged shards are equal to the run of one
-process: the same table and, with the same chunk, the same part files.
+The cases are divided into n consecutive, nearly equal pieces; shard k of n has the k-th, in its own run directory.  The
+merged shards equal the run of one process: the same table and, with the same chunk, the same part files.
 """
 
 import os

@@ -158,8 +158,8 @@ def _limit_words(verdict: "Verdict") -> str:
 def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, Summary]":
     """Summary of every metric, or of those named; StoreError for a name that is no metric.
 
-    Quantiles are the usual ones and those between which a case lies with the probability of [report]; each bound of a
-    quantile holds with its confidence.  Cases that were chosen, as those of a grid, have none.
+    Quantiles are the usual ones, and those between which a case lies with the probability of [report]; each bound of a
+    quantile has its confidence.  Designs without random sampling, such as a grid, have no quantiles.
 
     A failed case has no value, whatever its row contains.
     """
