@@ -1,8 +1,7 @@
 """Candidates of a tuning: sets of values of the tuned parameters, flown together and scored.
 
-All candidates of a generation, times the dispersed cases where a quantile is asked for, are flown as one table of
-cases. Every candidate flies the same cases with the same noise, so that two candidates differ by their parameters
-alone.
+All candidates of a generation, and for quantiles all their dispersed cases, are flown as one table of cases.  Every
+candidate flies the same cases with the same noise, so that two candidates differ only in their parameters.
 """
 
 from collections import Counter

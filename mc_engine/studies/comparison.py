@@ -1,9 +1,9 @@
-"""Comparison of two runs: which metrics, requirements and fractions of cases changed beyond chance.
+"""Comparison of two runs: which metrics, requirements and fractions of cases changed significantly.
 
-Cases are compared in pairs where both runs flew the same inputs under the same number, which takes what the inputs
-have in common out of the difference; else as two independent samples.  All tests of a comparison (shift and spread of
-each metric, the fraction of cases completed, the fraction inside each requirement) hold together at `alpha`
-(Holm): if nothing changed, the chance of even one false alarm is at most alpha.
+If both runs flew the same inputs under the same case numbers, cases are compared in pairs, which removes the scatter of
+the inputs from the difference.  Otherwise the runs are compared as two independent samples.  All tests of a comparison
+(shift and spread of each metric, fraction of cases completed, fraction inside each requirement) hold together at
+`alpha` (Holm): if nothing changed, the probability of one or more false alarms is at most alpha.
 """
 
 from collections.abc import Callable, Mapping
@@ -50,10 +50,10 @@ class Pairing:
 class VerdictChange:
     """A requirement's verdict in each run, by that run's own limits; None where a run has no such requirement.
 
-    Of paired runs both verdicts are on the pairs alone.  inside : by run, how many of these cases are inside the
-    limits, of all.
-    notes : by run, what is to be known of it: which requirement fails the joint verdict or is the only one, and whether
-        run B requires something else.
+    For paired runs both verdicts are on the pairs alone.  inside : by run, (cases inside the limits, all of these
+    cases).
+    notes : by run, remarks: which requirement makes the joint verdict fail or is the only one, and whether run B
+        requires something else.
     """
 
     name: str
@@ -86,8 +86,8 @@ class VerdictChange:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Run A (before) and run B (after).  cases, ok, wanted : by run, its cases, those of them that completed, and how
-    many it is to have, which are more while it is not complete.
+    """The comparison of run A (before) with run B (after).  By run, cases : flown; ok : completed; wanted : number of
+    cases of the complete run.
 
     confidence : of every interval, that of B's [report].
     metrics in the order of B's columns; units by metric; left_out : metrics that are not compared, and why.
@@ -114,7 +114,7 @@ class Comparison:
 
     @property
     def n_tests(self) -> int:
-        """Tests that were compared with alpha together."""
+        """Number of tests that hold together at alpha."""
         return int(np.isfinite(_p_values(self.metrics, self.shares)).sum())
 
     @property
@@ -125,7 +125,7 @@ class Comparison:
 
     @property
     def same(self) -> tuple[str, ...]:
-        """The metrics with nothing to tell."""
+        """The metrics without any difference."""
         return tuple(metric.metric for metric in self.metrics if metric.same)
 
     @property
@@ -149,7 +149,7 @@ class Comparison:
     def worse_verdicts(self) -> tuple[VerdictChange, ...]:
         """Requirements with a worse verdict on the same cases; on other cases chance alone may change a verdict.
 
-        None where a design gives no probabilities: its verdicts are not demonstrable, whatever the cases show.
+        Empty if a design gives no probabilities, because its verdicts are always "not demonstrable".
         """
         comparable = self.pairing.paired and not self.chosen
         return tuple(verdict for verdict in self.verdicts if verdict.worse) if comparable else ()
@@ -171,16 +171,16 @@ class Comparison:
 
     @property
     def changed(self) -> bool:
-        """Whether anything changed beyond chance, or a requirement has a worse verdict on the same cases."""
+        """Whether anything changed significantly, or a requirement has a worse verdict on the same cases."""
         return bool(self.shifted or self.spread or self.moved_shares or self.worse_verdicts)
 
 
 def compare_runs(
     a: Store, b: Store, names: tuple[str, str], *, alpha: float = ALPHA, tolerance: float = TOLERANCE
 ) -> Comparison:
-    """Run `a` (before) against run `b` (after).  names : what to call them, for example their directories.
+    """The Comparison of run `a` (before) with run `b` (after).  names : of the runs, for example their directories.
 
-    EngineError if they have no metric of the same name and unit: that nothing changed would be no answer.
+    EngineError if they have no metric with the same name and unit.
     """
     if no_store := [run for run in (a, b) if not isinstance(run, Store)]:
         raise EngineError(f"runs are compared by their stores, and {no_store[0]!r} is none; open_store opens one")

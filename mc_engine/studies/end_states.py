@@ -24,12 +24,12 @@ _DAY_S = 86_400.0
 
 
 def end_columns(store: Store) -> list[str]:
-    """case_id, status, and time and state at the end: what an export holds unless told otherwise."""
+    """case_id, status, and time and state at the end: the columns of an export by default."""
     return ["case_id", "status", *(column.name for column in store.columns if column.role == "state")]
 
 
 def write_csv(store: Store, columns: Sequence[str], out: Path) -> int:
-    """A row a case, failed ones too; their status is among the columns unless left out.  Returns the rows.
+    """Write one row per case, including failed cases, whose status is a column by default.  Returns the number of rows.
 
     Numbers are written with all their digits: reading them back gives the same bits.
     """
@@ -39,7 +39,7 @@ def write_csv(store: Store, columns: Sequence[str], out: Path) -> int:
 
 
 def write_oem(store: Store, columns: Sequence[str], out: Path, epoch: str, frame: str, centre: str) -> tuple[int, int]:
-    """A segment for each completed case, with its last state at epoch + end time.  Returns (written, cases).
+    """Write a segment for each completed case, with its last state at epoch + end time.  Returns (written, cases).
 
     columns : the six of x, y, z and their rates, of lengths and speeds in any unit.  epoch : start of the flights, UTC;
     a day counts 86 400 s.  frame, centre : of the states; the run does not know them, so they are not checked.

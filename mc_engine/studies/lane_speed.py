@@ -1,18 +1,18 @@
 """Speed of a model on one thread, one case at a time and in SIMD batches: the time of the kernel calls alone.
 
-Compiling, or loading the compiled kernel, is timed separately.  The builds take turns at short flights and the shortest
+Compiling, or loading the compiled kernel, is timed separately.  The builds fly short flights in turn, and the shortest
 time of each counts, so that other work on the machine has little influence.
 
-`compare_methods` seeks the integration method that is fastest at the error of the model's own method, with its step or
-tolerances.  Every other method that can fly the model is tried, on a fixed grid from long steps to short ones, or from
-rough tolerances to fine ones, until its error is no larger than the model's own.  The error is the largest difference
-of a metric from a reference flight, in any case, as a fraction of that metric's largest magnitude; the metric that has
-it is named.  Metrics that are but the rounding of larger numbers, such as the altitude at the ground, are left out.
-The reference is flown by DOP853 to a tolerance of 1e-13.  An error that may be the reference's own counts as none:
-one of a few times the difference that a tolerance of 2e-13 makes, such as in the time of a flat maximum.  Left out and
-named are metrics that the model's own method does not determine where it does others, such as the time of the largest
-of several maxima that are alike.  Samples of the control stay where they are: a model with
-`control` is tried with whole numbers of steps between them.
+`compare_methods` finds the fastest integration method, with its step or tolerances, that has at most the error of the
+model's own method.  Every other method that can fly the model is tried, from long steps to short ones, or from loose
+tolerances to tight ones, until its error is no larger than the model's own.  The error is the largest difference of a
+metric from a reference flight, in any case, as a fraction of that metric's largest magnitude; this metric is named.
+Metrics that are only rounding errors of larger numbers, such as the altitude at the ground, are left out.  The
+reference is flown by DOP853 to a tolerance of 1e-13.  Errors that may be those of the reference count as zero: up to a
+few times the difference that a tolerance of 2e-13 makes, such as in the time of a flat maximum.  Metrics that the
+model's own method does not determine, while it determines others, are left out and named, such as the time of the
+largest of several similar maxima.  The times of control samples stay the same: a model with `control` is tried with
+whole numbers of steps between them.
 """
 
 import time
@@ -67,9 +67,9 @@ class Flight:
 
 @dataclass
 class Timing:
-    """By the width of the build, shortest times: of a case [s], of a case-step [ns]; and time [s] until it can fly.
+    """Shortest times by width of the build: of a case [s], of a case-step [ns]; and the time [s] until it can fly.
 
-    Models that choose their steps have no time of a step: `ns` is empty.
+    With adaptive steps there is no time of a step: `ns` is empty.
     """
 
     case_s: dict[int, float] = field(default_factory=dict)
@@ -77,7 +77,7 @@ class Timing:
     ready_s: dict[int, float] = field(default_factory=dict)
 
     def ratio(self, width: int) -> float:
-        """How many times longer a case takes one at a time."""
+        """Ratio of the times of a case: flown one at a time, and with this width."""
         return self.case_s[1] / self.case_s[width]
 
 

@@ -1,11 +1,11 @@
 """A campaign as a limit state function: from standard normal numbers to the margin of a case to a requirement.
 
-Each dispersed input has one independent standard normal number u.  Phi(u) is its probability, the campaign's
-correlations are applied to these, and the input is the quantile.  The cases so have the distribution that the campaign
-file describes.
+Each dispersed input has one independent standard normal number u.  The campaign's correlations are applied to the
+probabilities Phi(u), and the input is the quantile.  So the cases have the distribution that the campaign file
+describes.
 
-Noise in flight is addressed by the number of a case.  Numbers here begin at FIRST_NOISE, so that no case has the noise
-of a case of the campaign's own runs.
+Noise in flight is addressed by case numbers.  Here they begin at FIRST_NOISE, so that no case has the same noise as a
+case of the campaign's own runs.
 """
 
 import os
@@ -32,7 +32,7 @@ AT_LIMIT = float(np.nextafter(0.0, 1.0))  # margin of a case right at its limit:
 
 
 class LimitState:
-    """margin(u, noise) of a campaign and one of its requirements, which remembers what its cases came to.
+    """The function margin(u, noise) of a campaign and one of its requirements, which keeps the results of its cases.
 
     names : the dispersed inputs, one column of u each.  status, metric : of every case flown, in order.
     metric_field : the metric of the requirement, as the model declares it.

@@ -1,11 +1,11 @@
 """Runs and cases for an interactive session or a notebook: verdicts, statistics, case table, time histories.
 
     run = open_run("runs/deorbit")
-    run.verdicts                  every requirement, judged
+    run.verdicts                  the verdict on every requirement
     run.cases                     the case table, a pandas DataFrame
     run.case(17).history()        its time history, from the store or flown again
 
-They only read; methods that write are in `mc_engine.store.store`.
+Nothing is written here; `mc_engine.store.store` has the methods that write.
 """
 
 from base64 import b64encode
@@ -55,7 +55,7 @@ def open_run(path: str | Path) -> "Run":
 
 
 class _Metrics(dict[str, "Summary"]):
-    """Summaries by metric; a name that is not there is answered with the nearest."""
+    """Summaries by metric; the error for an unknown name suggests the nearest one."""
 
     def __init__(self, path: Path, by_name: "dict[str, Summary]"):
         super().__init__(by_name)
@@ -67,9 +67,9 @@ class _Metrics(dict[str, "Summary"]):
 
 @dataclass(frozen=True)
 class Run:
-    """The results of a run, as they are when they are first asked for; open it again to see cases flown since.
+    """The results of a run, read when they are first used; open the run again to see cases flown since.
 
-    In a notebook it shows itself as tables of verdicts and metrics.
+    A notebook shows it as tables of verdicts and metrics.
 
     store : Store, the run directory
 
@@ -97,17 +97,17 @@ class Run:
 
     @cached_property
     def cases(self) -> pd.DataFrame:
-        """A row a case, by case_id; `attrs["units"]` and `["descriptions"]` say what the columns are."""
+        """The case table, a row per case, by case_id; `attrs["units"]` and `["descriptions"]` describe the columns."""
         return self.store.cases()
 
     @property
     def statuses(self) -> dict[str, int]:
-        """How many cases ended in which status."""
+        """Number of cases by status."""
         return self.store.status_counts()
 
     @cached_property
     def verdicts(self) -> "list[Verdict]":
-        """Every requirement judged on the cases at hand, and all of them at once where there are several."""
+        """The verdicts on all requirements from the present cases, and the joint verdict if there are several."""
         judged, joint = judgement(self.store)
         return judged if joint is None else [*judged, joint]
 
@@ -122,7 +122,7 @@ class Run:
         return self.case(NOMINAL_CASE)
 
     def case(self, case_id: int) -> "Case":
-        """One case by its number; -1 is the nominal one.  StoreError if it is not there, or no number."""
+        """One case by its number; -1 is the nominal case.  StoreError if there is none, or it is no number."""
         if not isinstance(case_id, int | np.integer) or isinstance(case_id, bool):
             raise StoreError(f"{self.path}: case {case_id!r} is not there; cases are whole numbers, from 0 to "
                              f"{self.store.n_cases - 1}, and {NOMINAL_CASE} is the nominal one")  # fmt: skip
@@ -169,11 +169,11 @@ class Run:
 class Case:
     """One case of a run: its inputs, its results and its flight.
 
-    In a notebook it shows itself as a table, with a picture of the history if that was saved.
+    A notebook shows it as a table, with a plot of the time history if that was saved.
 
     store : Store, the run directory
     case_id : int, its number; -1 for the nominal case
-    row : dict, its line of the case table, by column name
+    row : dict, its row of the case table, by column name
 
     >>> case = open_run("runs/small").case(3)
     >>> case.status
@@ -195,27 +195,27 @@ class Case:
 
     @property
     def status(self) -> str:
-        """How it ended, a word of `mc_engine.status`."""
+        """How the case ended, a word of `mc_engine.status`."""
         return str(self.row["status"])
 
     @property
     def reason(self) -> str:
-        """Why it was refused, else empty."""
+        """Why the case was refused; else empty."""
         return str(self.row["reason"])
 
     @property
     def inputs(self) -> pd.Series:
-        """Its dispersed inputs, in the units that their names end in."""
+        """The dispersed inputs of the case, in the units of their columns."""
         return self._with_role("dispersion")
 
     @property
     def metrics(self) -> pd.Series:
-        """What it came to; NaN where it failed."""
+        """The metrics of the case, in the units of their columns; NaN if it failed."""
         return self._with_role("metric")
 
     @property
     def end_state(self) -> pd.Series:
-        """Its last state, with the time."""
+        """The last state of the case, with its time."""
         return self._with_role("state")
 
     def _with_role(self, role: str) -> pd.Series:
@@ -223,9 +223,9 @@ class Case:
         return pd.Series({name: self.row[name] for name in names}, name=self.name, dtype=object).infer_objects()
 
     def history(self) -> pd.DataFrame:
-        """Its flight: case_id, t_s and the outputs.  Read if the run kept it, else flown again.
+        """The time history of the case: case_id, t_s and the outputs.  Read if the run saved it, else flown again.
 
-        StoreError if what is flown again is not the case of the run, bit for bit.
+        StoreError if the repeated flight does not give the stored numbers bit for bit.
         """
         kept = self._kept_history()
         if len(kept):
@@ -240,23 +240,23 @@ class Case:
         return table[table["case_id"] == self.case_id].reset_index(drop=True)
 
     def trace(self, seconds: float = 600.0) -> pd.DataFrame:
-        """Every intermediate number of its flight by name, at every step: a table for looking into a model.
+        """All intermediate results of the model in the flight of the case, by name, at every step: a DataFrame.
 
-        The case is flown by Python, which takes some milliseconds a step; given up after so many seconds.
+        The case is flown by Python, which takes some milliseconds per step; given up after `seconds`.
 
         Returns a DataFrame with a row for the start, the end of each step, each event, and both sides of each call of
         `control` and `switch`. Its columns:
 
         t_s, states and outputs : in declared units, under their own names; `attrs["units"]` says which
-        m.NAME : the discrete state, in SI, as all that follows
-        d(NAME)/dt : what `rhs` gives for a state
+        m.NAME : the discrete state, in SI, as all columns below
+        d(NAME)/dt : the derivative of a state, from `rhs`
         event.NAME : the functions of the events
-        FUNCTION.VARIABLE : what a function of the model assigns, as `rhs.drag`; `rhs.wind.speed` where `rhs` calls
-            `wind`, `rhs.wind[2].speed` where it calls it again, `rhs.force.x` for a field of a record. Of `initial`,
-            `start`, `control` and `switch`, what they assigned last.
+        FUNCTION.VARIABLE : a variable assigned in a function of the model, as `rhs.drag`; `rhs.wind.speed` in `wind`
+            called by `rhs`, `rhs.wind[2].speed` in the second call, `rhs.force.x` for a field of a record.  For
+            `initial`, `start`, `control` and `switch`, the values of the last call.
 
-        Raises StoreError for a case that never started, or whose end is not that of the run bit for bit; ModelError for
-        a simulator, which has no physics to look into.
+        Raises StoreError for a case that never started, or whose end differs from the stored one in any bit; ModelError
+        for a simulator, which has no physics.
         """
         from mc_engine.flight.interpreted import OutOfTime  # which loads the compiler
         from mc_engine.runner.flown_campaign import campaign_of
@@ -282,9 +282,9 @@ class Case:
         return trace
 
     def replay(self) -> "Replay":
-        """The case flown again, alone, every stored number compared bit for bit.
+        """The Replay of the case: it is flown again, and every stored number compared bit for bit.
 
-        StoreError for the nominal case, which is no draw of the campaign.
+        StoreError for the nominal case, which is not a case of the design.
         """
         from mc_engine.runner.runner import replay  # which loads the compiler
 
@@ -305,7 +305,7 @@ class Case:
         return head + _html_table(["", "column", "value", "unit"], rows) + self._picture()
 
     def _picture(self) -> str:
-        """The kept history as a small picture; nothing is flown for being shown."""
+        """A small plot of the saved time history; without one, nothing is flown."""
         history = self._kept_history()
         if not len(history):
             return "<p>Its history was not kept; <code>.history()</code> flies it again.</p>"

@@ -27,7 +27,7 @@ class PlanRow(NamedTuple):
     """`cases` is the smallest number of cases that demonstrates the required probability with `failures` failures.
 
     shown : probability that they demonstrate (lower confidence bound)
-    half_rate : probability that so many cases pass a system that fails half as often as required
+    half_rate : probability that this number of cases passes a system that fails half as often as allowed
     """
 
     failures: int
@@ -37,7 +37,7 @@ class PlanRow(NamedTuple):
 
 
 def plan_row(share: float, confidence: float, failures: int) -> PlanRow:
-    """The smallest sample for so many failures, and what it comes to."""
+    """The row for this number of failures: the smallest number of cases, and what it demonstrates."""
     cases = smallest_sample(share, confidence, failures)
     passes = pass_chance(cases, failures, half_rate_share(share))
     return PlanRow(failures, cases, lower_bound(cases - failures, cases, confidence), passes)

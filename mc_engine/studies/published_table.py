@@ -1,4 +1,4 @@
-"""Published values beside ours as Markdown: one table for a campaign, a short one for all of them."""
+"""Published values compared with ours, as Markdown: one table for each campaign, and a short one for all of them."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence

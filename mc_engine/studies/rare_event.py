@@ -1,7 +1,7 @@
-"""Probability that a campaign violates a requirement, far below what its plain cases can show.
+"""Probability that a campaign violates a requirement, for probabilities too small for plain cases.
 
-Model, distributions and correlations are the campaign's own; only the sampling differs: `statistics.subset_simulation`
-or `statistics.importance_sampling`.  The same campaign, method, settings and seed give the same result on any number of
+Model, distributions and correlations are the campaign's; only the sampling differs: `statistics.subset_simulation` or
+`statistics.importance_sampling`.  The result depends on campaign, method, settings and seed, not on the number of
 threads.
 """
 
@@ -45,12 +45,12 @@ def estimate_rare_event(
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> RareEventRecord:
-    """Estimate the probability of not meeting a requirement and leave the result in the new directory `out`.
+    """Estimate the probability of not meeting a requirement, and store the result in the new directory `out`.
 
-    requirement : its name; the only one by default.  method : one of METHODS.  progress : called with the numbers of
-    cases flown and failed.  The interval holds with the confidence of the campaign's [report], or with the greater one
-    at which its upper end alone holds with the confidence that the requirement asks for.  Raises RunInterrupted on
-    Ctrl-C; nothing is stored then.
+    requirement : its name; not needed for a single one.  method : one of METHODS.  progress : called with the numbers
+    of cases flown and failed.  The interval has the confidence of the campaign's [report], or the greater one at which
+    its upper end alone has the confidence that the requirement asks for.  Raises RunInterrupted on Ctrl-C; nothing is
+    stored then.
     """
     path = Path(out) if out is not None else default_folder(f"{campaign.name}-rare")
     chosen = chosen_requirement(campaign, requirement)
@@ -139,11 +139,11 @@ def _result_record(limit: LimitState, estimate: RareEvent) -> dict[str, Any]:
 
 
 def _failed_inputs(limit: LimitState, estimate: RareEvent) -> tuple[list[dict[str, Any]], list[str]]:
-    """Where failures lie: one record for each input, and a remark where one mean does not describe them.
+    """The inputs of failed cases: one record for each input, and a remark if one mean does not describe them.
 
-    The likeliest failed case is the one nearest to the origin of standard normal space, where the density is greatest:
-    the design point of structural reliability, as near as the cases came to it.  Where failures lie in several regions,
-    the likeliest failed case on the opposite side of the origin is added, if there is one.
+    The most probable failed case is the one nearest to the origin of standard normal space, where the density is
+    largest: the nearest one flown to the design point of structural reliability.  If failures are in several regions,
+    the most probable failed case on the opposite side of the origin is added, if there is one.
     """
     failed = np.flatnonzero(estimate.cases.failed)
     if not failed.size:

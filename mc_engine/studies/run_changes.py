@@ -12,7 +12,7 @@ SHOWN_OF_A_DIGEST = 12
 
 @dataclass(frozen=True)
 class Difference:
-    """One thing that is not the same in both runs: before and after, in words; "none" where a run has no such thing."""
+    """One difference between two runs: before and after, in words; "none" if a run has no such item."""
 
     what: str
     before: str

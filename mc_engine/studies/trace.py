@@ -1,6 +1,6 @@
-"""The trace of one case: every number that its physics gives a name, at every step of its flight.
+"""The trace of one case: every named intermediate result of its physics, at every step of its flight.
 
-The case is flown by Python with the loops that kernels are compiled from, so its steps are those of the stored case.
+The case is flown by Python with the loops from which kernels are compiled, so its steps are those of the stored case.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Tuning: a search for the parameters with the best metrics, nominal or over dispersed cases, within constraints.
+"""Tuning: a search for the parameters with the best metrics, of the nominal or dispersed cases, within constraints.
 
 A generation is flown as one table of cases; see `candidates`.  Every candidate flown is kept, and the front is computed
 from all of them, not from the last generation alone.
@@ -53,7 +53,7 @@ def tune(
     workers: int | None = None,
     progress: ProgressCall | None = None,
 ) -> TuningRecord:
-    """Search for the parameters that the campaign's section [tuning] asks for, by NSGA-II, and store the result.
+    """Search for the best parameters by NSGA-II, as the campaign's section [tuning] specifies, and store the result.
 
     Needs the extra `tune` (pymoo).  The result is stored after every generation.
 
@@ -67,9 +67,9 @@ def tune(
 
     Returns a TuningRecord.
 
-    Raises CampaignError without a [tuning], EngineError without pymoo and for a number that no search can have,
-    StoreError if `out` is occupied, and RunInterrupted after the generation in which Ctrl-C was pressed; the
-    generations completed by then are stored.
+    Raises CampaignError without a [tuning], EngineError without pymoo and for invalid numbers, StoreError if `out` is
+    occupied, and RunInterrupted after the generation in which Ctrl-C was pressed; the generations completed by then are
+    stored.
 
     >>> record = tune(load_campaign("apogee.toml"), "runs/apogee", generations=2, population=4)
     >>> len(record.evaluations)
@@ -164,7 +164,7 @@ def is_stalled(flown: Sequence[Generation], patience: int) -> bool:
 
 
 def dominated_shares(fronts: Sequence[np.ndarray]) -> np.ndarray:
-    """float64[n]: share that each front dominates of the box that holds them all; 0 for an empty one."""
+    """float64[n]: fraction of the common bounding box that each front dominates; 0 for an empty front."""
     every = np.vstack(list(fronts))
     if not len(every):
         return np.zeros(len(fronts))

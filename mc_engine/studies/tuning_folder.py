@@ -2,7 +2,8 @@
 
     tuning.toml   tuning.json   evaluations.parquet   generations.parquet   front.parquet   journal.jsonl
 
-All files are replaced together after each generation, so that a killed search leaves the result of a whole generation.
+All files are replaced together after each generation, so that a killed search leaves the result of its last complete
+generation.
 """
 
 from collections.abc import Callable
@@ -24,13 +25,13 @@ UNFINISHED = "not ended"  # instead of why the search ended
 
 @dataclass(frozen=True)
 class TuningRecord:
-    """The result of a search by `tune`: complete, or as far as an interrupted one came.
+    """The result of a search by `tune`, which may have been interrupted.
 
     path : Path, its directory
-    manifest : dict, what was searched, with which sources; ["tuning"] has the settings of the search and how it ended
-    evaluations : DataFrame, every candidate in the order flown, a row each
-    generations : DataFrame, the progress of the search, a row for each generation
-    front : DataFrame, the feasible candidates that no other one dominates; empty if none is feasible
+    manifest : dict, the campaign and its sources; ["tuning"] has the settings of the search and how it ended
+    evaluations : DataFrame, one row per candidate, in the order flown
+    generations : DataFrame, one row per generation: the progress of the search
+    front : DataFrame, the Pareto front: feasible candidates that no other one dominates; empty if none is feasible
 
     >>> record = open_tuning("runs/tuned")
     >>> record.feasible, list(record.front)[:4]
@@ -45,7 +46,7 @@ class TuningRecord:
 
     @property
     def feasible(self) -> bool:
-        """Whether a candidate was found inside all constraints, if there are any, with a number for every metric."""
+        """Whether a candidate was found that meets all constraints and has a number for every metric."""
         return len(self.front) > 0
 
 
