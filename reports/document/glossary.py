@@ -9,12 +9,22 @@ GLOSSARY = Terms(
             "One flight with its own drawn inputs. It is addressed by its number: the same seed and number give "
             "the same flight, alone or among a million.",
         ),
-        ("nominal", "The flight with every input at its nominal value; it has the number −1 and is in no statistic."),
-        ("dispersion", "An input that differs from case to case, with its distribution and the source of that."),
-        ("metric", "A number that a flight ends with. A failed case has none: it is counted, never dropped."),
+        (
+            "nominal",
+            "The flight with all inputs at their nominal values. It has the number −1 and is not part of any "
+            "statistic.",
+        ),
+        (
+            "dispersion",
+            "An input that differs from case to case, with its distribution and the source of this distribution.",
+        ),
+        (
+            "metric",
+            "A number that is computed for each flight. A failed case has none: it is counted, never dropped.",
+        ),
         (
             "n of n tried",
-            "How many cases a number rests on, of how many were flown. The difference failed, or has a "
+            "The number of cases on which a result is based, and the number flown. The others failed, or have a "
             "metric that is not a number.",
         ),
         (
@@ -24,26 +34,30 @@ GLOSSARY = Terms(
         ),
         (
             "pass",
-            "The lower confidence bound on the probability, at the confidence required, reaches the one required. The "
-            "bound is Clopper and Pearson’s where the number of cases was fixed in advance; with interim analyses it "
-            "is one that holds at every number of cases at once.",
+            "The lower confidence bound on the probability, at the required confidence, is at least the required "
+            "probability. The bound is that of Clopper and Pearson if the number of cases was fixed in advance; with "
+            "interim analyses it is a bound that holds at every number of cases at once.",
         ),
-        ("fail", "Even the upper bound, at the same confidence, stays below the probability required."),
+        (
+            "fail",
+            "The upper confidence bound, at the same confidence, is below the required probability.",
+        ),
         (
             "not demonstrable",
-            "The cases decide neither way: more of them are needed, or the design gives no probabilities.",
+            "Neither pass nor fail: more cases are needed, or the design gives no probabilities.",
         ),
         (
             "demonstrated bound",
             "Tolerance limit: the required fraction of cases lies inside it with the required confidence. An order "
-            "statistic (Wilks), distribution-free. Of two limits, both are moved inward by the distance to the nearest "
-            "that the required fraction keeps. Cases without a number take the worst ranks.",
+            "statistic (Wilks), distribution-free. Two limits are both moved inward by the same distance: the margin "
+            "to the nearer limit that the required fraction of cases has. Cases without a number take the worst "
+            "ranks.",
         ),
         (
             "consumer’s risk",
-            "The probability that the cases pass a system that just misses the probability required. The producer’s "
-            "risk is the reverse: that they do not pass one that fails only half as often as it may. More cases "
-            "lower it.",
+            "The probability that the cases pass a system that just misses the required probability. The producer’s "
+            "risk is the probability that they do not pass a system that fails only half as often as allowed. More "
+            "cases lower it.",
         ),
         (
             "percentile",
@@ -51,37 +65,36 @@ GLOSSARY = Terms(
         ),
         (
             "confidence bounds",
-            "Of a percentile two order statistics, each on its side of the true percentile with the confidence of the "
-            "report. A dash: the cases are too few for that bound. Probability and confidence are those of [report] in "
-            "the campaign file, 99.73 % and 90 % by default; a requirement may have its own.",
+            "For a percentile, two order statistics, each on its side of the true percentile with the confidence of "
+            "the report. A dash: the cases are too few for that bound. Probability and confidence are those of "
+            "[report] in the campaign file, 99.73 % and 90 % by default; a requirement may have its own.",
         ),
         (
             "exactness of the bounds",
-            "Bounds and intervals are exact for independent draws (mc), in a number that was fixed in advance unless "
-            "the report says otherwise. Latin hypercube "
-            "and Sobol designs scatter less, so the same bounds are then on the safe side. Nothing is said "
-            "of the correctness of the model.",
+            "Bounds and intervals are exact for independent draws (mc) if the number of cases was fixed in advance, "
+            "unless the report says otherwise. Latin hypercube and Sobol designs scatter less, so the same bounds are "
+            "then conservative. They do not cover errors of the model.",
         ),
         (
             "ellipse",
-            "The covariance ellipse of the cases, scaled so that it would hold the stated fraction of a normal "
-            "distribution. The fraction that it holds is counted. It is left out where it would leave the physical "
+            "The covariance ellipse of the cases, scaled so that it would contain the stated fraction of a normal "
+            "distribution. The fraction that it contains is counted. It is omitted where it would exceed the physical "
             "range of a metric.",
         ),
         (
             "distribution-free region",
-            "Holds at least the stated fraction of all possible cases, with the stated confidence, whatever their "
-            "distribution: half of the cases draw it, the other half set its size.",
+            "Contains at least the stated fraction of all possible cases, with the stated confidence, for any "
+            "distribution: its shape is computed from half of the cases, its size from the other half.",
         ),
         (
             "limit in a time history",
-            "Drawn where the metric of the requirement is the largest or smallest value of the quantity in the saved "
-            "histories. A dashed limit holds at the end of the flight, or must be met once.",
+            "Drawn if the metric of the requirement is the largest or smallest value of the quantity in the saved "
+            "histories. A dashed limit applies at the end of the flight, or has to be met only once.",
         ),
         (
             "comparison of options",
-            "Cases that differ in one option and have all other inputs in common are pairs; differences within pairs "
-            "are free of the scatter of the draws.",
+            "Cases that differ only in one option form pairs; differences within pairs are free of the scatter of the "
+            "other inputs.",
         ),
         (
             "first-order effect",
@@ -101,7 +114,7 @@ GLOSSARY = Terms(
         ),
         (
             "random draws",
-            "Noise made in flight, and inputs that only name a draw, such as the number of a day’s weather.",
+            "Noise made in flight, and inputs that only select a draw, such as the number of a day’s weather.",
         ),
         (
             "contributor to failures",
@@ -115,15 +128,15 @@ GLOSSARY = Terms(
         ),
         (
             "worst cases",
-            "Those with the smallest margin to the nearest limit; of a metric without a requirement, the largest. The "
-            "tables show the inputs that contribute most.",
+            "Those with the smallest margin to the nearest limit; for a metric without a requirement, those with the "
+            "largest values. The tables show the inputs that contribute most.",
         ),
         (
             "map",
-            "The surface is exact where a full grid was flown; else it is smoothed from scattered cases by a local "
-            "quadratic regression on as many of the nearest cases as cross-validation finds best. Its error is one "
-            "standard deviation: the scatter of the cases, and the bias where the surface bends. Blank where the cases "
-            "do not support a surface.",
+            "The surface is exact where a full grid was flown; else it is smoothed from scattered cases by local "
+            "quadratic regression, with a number of nearest cases chosen by cross-validation. Its error is one "
+            "standard deviation, from the scatter of the cases and from the bias where the surface is curved. Blank "
+            "where the cases do not support a surface.",
         ),
         (
             "1σ budget",
@@ -134,8 +147,8 @@ GLOSSARY = Terms(
         ),
         (
             "circular error probable (CEP)",
-            "The radius of the circle that holds 50 % of the impact points: about the target where there is one, "
-            "else about the mean impact point.",
+            "The radius of the circle that contains 50 % of the impact points: about the target if there is one, else "
+            "about the mean impact point.",
         ),
     )
 )

@@ -40,37 +40,37 @@ GLOSSARY = Terms(
     (
         (
             "significant",
-            "Its adjusted p-value is at most alpha. Holm’s adjustment covers all tests of this comparison together: if "
-            "nothing had changed, the chance of even one significant line is at most alpha.",
+            "The adjusted p-value is at most alpha. Holm’s adjustment covers all tests of this comparison together: "
+            "if nothing had changed, the probability of one or more significant lines is at most alpha.",
         ),
         (
             "paired",
-            "The same case, with the same inputs, in both runs: what the inputs do is taken out of the difference. "
-            "Otherwise the runs are two independent samples.",
+            "The same case, with the same inputs, in both runs: the scatter of the inputs is removed from the "
+            "difference. Otherwise the runs are two independent samples.",
         ),
         (
             "shift",
-            "The shift from run A to run B that the test does not distinguish from none: the Hodges–Lehmann "
-            "estimate, in standard deviations σ of run A. Means of both runs are in columns of their own.",
+            "The shift from run A to run B at which the test statistic is zero: the Hodges–Lehmann estimate, in "
+            "standard deviations σ of run A. Means of both runs are in columns of their own.",
         ),
         (
             "ties",
-            "So many cases have equal values that the estimate of the size is no change, though the test finds one: "
+            "So many cases have equal values that the estimated size is no change although the test is significant: "
             "see the means, or the distributions.",
         ),
         ("spread", "The ratio, run B over run A, of the distances from each run’s own median, estimated likewise."),
         (
             "tests",
-            "Paired: Wilcoxon’s signed ranks of the differences, Student’s t of the distances to each run’s own median "
-            "(the paired form of Brown and Forsythe’s test), McNemar’s exact test of a fraction. Unpaired: normal "
-            "scores, Brown and Forsythe’s test, Fisher’s exact test. Those of shifts and fractions are "
-            "distribution-free; those of spread are approximate, with more false alarms where a metric has a long tail "
-            "and one of two unpaired runs has far fewer cases. Each size and interval of a metric is of the quantity "
-            "that its test is of: the interval excludes no change exactly where the test, by itself, finds one.",
+            "Paired: Wilcoxon’s signed ranks of the differences, Student’s t of the distances to each run’s own "
+            "median (the paired form of Brown and Forsythe’s test), McNemar’s exact test of a fraction. Unpaired: "
+            "normal scores, Brown and Forsythe’s test, Fisher’s exact test. Those of shifts and fractions are "
+            "distribution-free; those of spread are approximate, with more false alarms where a metric has a long "
+            "tail and one of two unpaired runs has far fewer cases. Size and interval of a change are of the quantity "
+            "that is tested: the interval excludes no change exactly if the test, by itself, is significant.",
         ),
         (
             "intervals",
-            "They hold with the confidence of run B’s [report], one by one; they are not widened for their number.",
+            "Each has the confidence of run B’s [report]; they are not widened for their number.",
         ),
     )
 )

@@ -63,35 +63,35 @@ GLOSSARY = Terms(
     (
         (
             "margin",
-            "How far the metric is inside its limit, in its own unit; the nearer one of two limits. A case outside a "
-            "limit is called failed here, as is one that did not complete or has no number.",
+            "Distance of the metric inside its limit, in its own unit; with two limits, to the nearer one. A case "
+            "outside a limit is called failed here, as is one that did not complete or has no number.",
         ),
         (
             "subset simulation",
-            "The tenth of the cases of a level with the smallest margins starts Markov chains, which give the cases of "
-            "the next level. The probability is the product of the fractions. Several runs are made, and the interval "
-            "comes from their scatter. Au & Beck (2001); Papaioannou and others (2015).",
+            "In each level, the tenth of the cases with the smallest margins starts Markov chains, which give the "
+            "cases of the next level. The probability is the product of the fractions. Several runs are made, and the "
+            "interval comes from their scatter. Au & Beck (2001); Papaioannou and others (2015).",
         ),
         (
             "cross entropy",
-            "Importance sampling: cases are drawn where failures are, from a density fitted in levels, and weighted by "
-            "the density of the dispersions over it. The interval is that of the last level. Papaioannou, Geyer & "
-            "Straub (2019).",
+            "Importance sampling: cases are drawn where failures are, from a density fitted in levels, and weighted "
+            "by the density of the dispersions divided by this density. The interval is that of the last level. "
+            "Papaioannou, Geyer & Straub (2019).",
         ),
         (
             "noise in flight",
-            "Where the model draws noise, the probability is over inputs and noise together: chains draw the noise of "
-            "a case anew in half of their steps and keep it in the others.",
+            "If the model draws noise, the probability is over inputs and noise together: chains draw the noise of a "
+            "case anew in half of their steps and keep it in the others.",
         ),
         (
             "sigma",
-            "An input’s distance from its median, as the normal deviation that is as improbable; for a normal input "
-            "its standard deviation.",
+            "Distance of an input from its median, in standard deviations of a normal distribution with the same "
+            "probability; for a normal input its own standard deviation.",
         ),
         (
             "likeliest failed case",
-            "The design point: of all failed cases the one nearest to the medians of all dispersions together. Across: "
-            "the nearest one on the other side.",
+            "The design point: of all failed cases the one nearest to the medians of all dispersions together. "
+            "Across: the nearest failed case on the opposite side.",
         ),
     )
 )

@@ -38,18 +38,21 @@ GLOSSARY = Terms(
         (
             "front",
             "Of all feasible candidates that were flown, those that no other one equals or beats in every objective "
-            "and beats in one. Which of them is best is a choice between the objectives.",
+            "and beats in one (Pareto front). Which of them is best is a choice between the objectives.",
         ),
-        ("violation", "How far a candidate is beyond its limits, as fractions of each limit, added up."),
+        (
+            "violation",
+            "The sum of the distances of a candidate beyond its limits, each as a fraction of the limit.",
+        ),
         (
             "quantile",
             "The order statistic of the candidate’s dispersed cases; a case that failed takes the worst rank. All "
-            "candidates fly the same cases with the same noise, so they differ by their choice alone.",
+            "candidates fly the same cases with the same noise, so they differ only by the choice of parameters.",
         ),
         (
             "fraction of the box",
-            "Of the box that holds the fronts of all generations: what the front so far dominates. It levels off when "
-            "the search brings nothing new; it does not show that nothing better exists.",
+            "The fraction of the common bounding box of all generations’ fronts that the present front dominates. It "
+            "levels off when the search finds nothing new; it does not show that nothing better exists.",
         ),
     )
 )
