@@ -1,6 +1,6 @@
 """Reports of a run: one self-contained HTML page and one typeset PDF with the same contents.
 
-The names load what they need when they are first used: the process that fills in a template needs next to nothing.
+Modules are imported when the names are first used, because the process that fills in a template needs hardly any.
 """
 
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""What `mc-engine report RUN...` does: read the runs or tunings, build the contents, write the files."""
+"""The work of `mc-engine report RUN...`: read the runs or tunings, build the contents, write the files."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -53,11 +53,11 @@ def write_reports(
     template: str | Path | None = None,
     beside: Sequence[str | Path] = (),
 ) -> list[Path]:
-    """Write the reports asked for, and report.json, into the directory of a run, a tuning or a rare event.
+    """Write reports in `formats`, and report.json, into the directory of a run, a tuning or a rare event.
 
-    template : a file with sections of the user's own; it sees this run and those of `beside`, see `user_sections`.
-    Returns the paths of the reports and of files that belong to them (a footprint's KML), not of a Markdown report's
-    figures.  The contents are built once.  All files of a format appear together or not at all.
+    template : a file with the user's own sections; it sees this run and those of `beside`, see `user_sections`.
+    Returns the paths of the reports and of the files that belong to them (a footprint's KML), but not of the figures of
+    a Markdown report.  The contents are built once.  All files of a format appear together or not at all.
     """
     formats = (formats,) if isinstance(formats, str) else tuple(formats)
     if unknown := [name for name in formats if name not in FORMATS]:

@@ -23,7 +23,7 @@ def replay_picture(run: Store, case_id: int, history: pd.DataFrame) -> bytes:
 
 
 def replay_drawing(run: Store, case_id: int, history: pd.DataFrame) -> Drawing:
-    """A panel a quantity that varies."""
+    """The figure: a panel for each quantity that varies."""
     flown = Flown(run, "")
     columns = {name: history[name].to_numpy(dtype=np.float64) for name in quantity_names(history)}
     t = history["t_s"].to_numpy(dtype=np.float64)

@@ -1,6 +1,6 @@
 """The section of the contributors: total and first-order effects of inputs, groups and random draws.
 
-From the flights beside the run, or from the table of cases, which also tells trends and leaves a share unexplained.
+From the additional flights, or from the table of cases, which also gives trends and leaves a fraction unexplained.
 """
 
 from collections.abc import Iterator

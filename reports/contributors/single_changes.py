@@ -1,4 +1,4 @@
-"""What each input does alone, in a run of design one_at_a_time: changes from the case with all inputs nominal."""
+"""Effect of each input alone, in a run of design one_at_a_time: changes from the case with all inputs nominal."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
-"""What a report says, as plain data: sections of texts, tables and figures, in reading order.
+"""The contents of a report as plain data: sections of texts, tables and figures, in reading order.
 
-Built once by `contents`, drawn by `html`, `pdf` and `markdown`.  All strings are plain text; escaping is the
-renderers' work, and no renderer meets a character that steers, reorders or hides: a document is clean once it is made.
+Built once by `contents`, rendered by `html`, `pdf` and `markdown`.  All strings are plain text, which the renderers
+escape.  A document contains no control characters and no characters that reorder or hide text.
 """
 
 from collections.abc import Iterable, Iterator
@@ -98,7 +98,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Card:
-    """One line of the headline box: a label, its answer, and the sentence behind it."""
+    """One line of the headline box: a label, its result, and a sentence on it."""
 
     label: str
     answer: str
@@ -121,7 +121,7 @@ class CaseColumn:
 
 @dataclass(frozen=True)
 class CaseData:
-    """Cases that an interactive page can look up: all, or those drawn, the worst, and those that did not pass.
+    """Cases in an interactive page: all, or those drawn in figures, the worst, and those that did not pass.
 
     outcome : per case an index into `outcomes`.  axes : names of the two columns that the figure of cases starts with.
     histories : by case, then quantity, its times and values; time, quantities : their labels; the nominal is case -1.
@@ -140,7 +140,7 @@ class CaseData:
 
 @dataclass(frozen=True)
 class Attachment:
-    """A file that is written beside the report."""
+    """A file that is written next to the report."""
 
     name: str
     content: bytes

@@ -1,7 +1,7 @@
-"""What figures are made of: panels of marks.  `screen` and `paper` draw them; this module depends on neither.
+"""Figures as data: panels of marks.  `screen` and `paper` draw them; this module depends on neither.
 
-A drawing says once what is to be seen, in the units of its axes; sizes and widths are pixels on the screen, and paper
-scales them.  Colours with an @ are the page's own.  A mark's `key` is its text in the figure's key, said once.
+A drawing is in the units of its axes.  Sizes and widths are pixels on the screen, and paper scales them.  Colours with
+an @ are those of the page.  A mark's `key` is its text in the legend of the figure, which shows equal texts once.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -248,7 +248,7 @@ class Plot:
 
     @property
     def words(self) -> str:
-        """What it shows, for those who do not see it: texts of few points and bars, else its ranges, and its limits."""
+        """The alternative text: texts of points and bars if they are few, else its ranges; and its limits."""
         listed = [mark.texts for mark in self.marks if isinstance(mark, Points | Bar) and len(mark.texts) <= MOST_TOLD]
         said = [text for texts in listed for text in texts] or [" against ".join(self._ranges())]
         said += [mark.name for mark in self.marks if isinstance(mark, Limit)]
@@ -291,7 +291,7 @@ class Drawing:
 
     @property
     def alternative(self) -> str:
-        """The figure in words, for those who do not see it."""
+        """The alternative text of the figure."""
         panels = "; ".join(plot.words for plot in self.plots)
         key = "".join(f"; {mark.key}" for mark in self.key if mark.key not in panels)
         return f"{self.form}. {self.words or panels + key}."

@@ -1,4 +1,4 @@
-"""Cases over two columns, a point a case: clouds by class, regions that hold them, and where limits run."""
+"""Cases over two columns, one point per case: clouds by class, regions that contain them, and lines of limits."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What cases say of inputs and metrics: success along an input, correlations, normal probability plots."""
+"""Statistical figures of inputs and metrics: success along an input, correlations, normal probability plots."""
 
 from collections.abc import Sequence
 

@@ -1,12 +1,12 @@
-"""Figures from a table of cases: a DataFrame in, a `Picture` out, which a notebook shows and `savefig` writes.
+"""Figures from a table of cases: from a DataFrame to a `Picture`, which a notebook shows and `savefig` writes.
 
     from reports.figures.table_figures import fuel_map, histogram, scatter
 
     cases = mc_engine.open_run("runs/deorbit").cases
     histogram(cases, "propellant_kg").savefig("propellant.png")
 
-They draw what the reports draw, in the same style.  A table from `open_run` brings its units along; of any other table
-the names stand alone.  Where there is a column `status`, cases that are not ok have no metrics.
+The figures are those of the reports, in the same style.  A table from `open_run` has units; for any other table the
+axes show only the names of columns.  If there is a column `status`, cases that are not ok have no metrics.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ POINTS_ON_MAP = 2000
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure in the style of the reports.  svg : of the width of a page."""
+    """A figure in the style of the reports.  svg : the figure, as wide as a page."""
 
     drawing: Drawing
 
@@ -45,7 +45,7 @@ class Picture:
         return self.svg
 
     def savefig(self, file: str | Path) -> None:
-        """Write it as SVG, PDF or PNG, as the file's ending says; EngineError for another."""
+        """Write it as SVG, PDF or PNG, by the ending of the file name; EngineError for another ending."""
         kind = Path(file).suffix.removeprefix(".").lower()
         if kind == "svg":
             Path(file).write_bytes(self.svg.encode())
@@ -56,7 +56,7 @@ class Picture:
 
 
 def histogram(table: pd.DataFrame, column: str) -> Picture:
-    """Cases over the values of a column, with its median and outer quantiles.
+    """Histogram of a column, with its median and outer quantiles.
 
     EngineError if there is no such column of numbers, or fewer than two cases have one.
     """
@@ -69,7 +69,7 @@ def histogram(table: pd.DataFrame, column: str) -> Picture:
 
 
 def scatter(table: pd.DataFrame, x: str, y: str) -> Picture:
-    """One column against another, a point a case.  EngineError as for `histogram`."""
+    """One column against another, one point per case.  EngineError as for `histogram`."""
     a, b = _numbers(table, x), _numbers(table, y)
     used = np.flatnonzero(np.isfinite(a) & np.isfinite(b))
     _refuse_few(used.size, 1, f"{x} and {y}")

@@ -1,4 +1,4 @@
-"""Where the flights of a run came down, and what distances count from."""
+"""The impact points of a run, and the reference points of distances."""
 
 from dataclasses import dataclass, replace
 
@@ -18,11 +18,11 @@ SAME_DISTANCE = 0.005  # of the sum of a distance and the median one: how far a 
 
 @dataclass(frozen=True)
 class Landing:
-    """What is known of one footprint.  rows : of the cases that came down;  above : that ended above the limit.
+    """The data of one footprint.  rows : of the cases that landed;  above : number that ended above the limit.
 
-    latitude, longitude : float64[n_held], degrees.  aim : what distances count from, if there is such a place.
-    misses : the metrics that are the distance from the target, that which deviates least first; the model may compute
-    it otherwise than along the geodesic, and a report tells one number for it, that of the first.
+    latitude, longitude : float64[n_held], degrees.  aim : the point from which distances are measured, if there is one.
+    misses : the metrics that are the distance from the target, the one that deviates least from the geodesic first.  A
+    model may compute this distance in another way; the report shows only the first of these metrics.
     """
 
     figure: FootprintFigure
@@ -36,7 +36,7 @@ class Landing:
 
     @property
     def miss(self) -> str:
-        """The metric that a report tells as the distance from the target; empty if there is none."""
+        """The metric that a report shows as the distance from the target; empty if there is none."""
         return self.misses[0] if self.misses else ""
 
     def geodesics(self, place: Mark) -> np.ndarray:
@@ -48,7 +48,7 @@ class Landing:
         return distances
 
     def distances(self, flown: Flown, place: Mark) -> np.ndarray:
-        """The same, from the target by the metric that is this distance."""
+        """Kilometres of all cases from a point; from the target, by the metric that is this distance."""
         if not self.miss or place.name != TARGET:
             return self.geodesics(place)
         distances = np.full(self.latitude.size, np.nan)
@@ -61,7 +61,7 @@ class Landing:
 
     @property
     def centre(self) -> Mark:
-        """What the circular error probable is about: the target where there is one, else the mean impact point."""
+        """The centre of the circular error probable: the target if there is one, else the mean impact point."""
         return self.aim if self.aim is not None and self.aim.name == TARGET else self.mean
 
     def at(self, place: Mark) -> np.ndarray:

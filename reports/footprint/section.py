@@ -1,4 +1,4 @@
-"""Where the flights end: the footprint's figure, its tables, and the files for maps."""
+"""The footprint of a run in a report: figure, tables, and files for maps."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -181,7 +181,7 @@ def _name(region: Ellipse | DensityRegion) -> str:
 
 
 def _region_table(flown: Flown, landing: Landing) -> Table:
-    """Contents stated and shares really inside."""
+    """The table of regions: stated contents, and fractions of cases inside."""
     regions = landing.footprint
     columns = (
         Column("Region", "text"),
@@ -276,7 +276,7 @@ def _distance_table(flown: Flown, landing: Landing) -> Table | None:
 
 
 def _distances(flown: Flown) -> tuple[float, ...]:
-    """The percentiles of distances that are told: none of cases that were chosen."""
+    """The percentiles of distances in the table; none for a design without random sampling."""
     return () if flown.chosen else DISTANCES
 
 

@@ -1,4 +1,4 @@
-"""The report as one HTML file: nothing is loaded from anywhere, so it works from a disk without a network."""
+"""The report as one self-contained HTML file, which needs no network."""
 
 import re
 from collections import Counter

@@ -1,7 +1,7 @@
-"""The report as data: `report.json`, everything that the pages say, with a documented schema.
+"""The report as data: `report.json`, with the contents of the pages and a documented schema.
 
-The numbers have all their digits, in the unit of their column.  `sections` holds the texts and tables of the pages as
-they are printed; all else is for programs.
+The numbers have all their digits, in the unit of their column.  `sections` has the texts and tables of the pages as
+printed; all other fields are for programs.
 """
 
 import json
@@ -28,7 +28,11 @@ class _Record(BaseModel):
 
 
 class Counts(_Record):
-    """cases : wanted.  flown : with a row in the table.  completed : with status ok.  inside_all_limits : of those."""
+    """Numbers of cases.
+
+    cases : of the complete run.  flown : with a row in the table.  completed : with status ok.  inside_all_limits : of
+    those completed.
+    """
 
     cases: int
     flown: int
@@ -39,15 +43,15 @@ class Counts(_Record):
 class RequirementRecord(_Record):
     """A requirement and what the cases demonstrate.
 
-    observed_probability : the fraction of the cases inside the limits, passed / tried; None, as are all other figures
-        of a probability, for a design without probabilities, such as a grid.
-    demonstrated_probability : the lower confidence bound on the probability of keeping the limits.
-    demonstrated : the tolerance limit of the metric that holds with the required probability and confidence;
-        `enclosed` in its place has two of them where there are two limits, both inside by the margin.
+    observed_probability : the fraction of cases inside the limits, passed / tried.  None, like all other probabilities,
+        for a design without probabilities, such as a grid.
+    demonstrated_probability : the lower confidence bound on the probability of being inside the limits.
+    demonstrated : the tolerance limit of the metric with the required probability and confidence.  A requirement with
+        two limits has `enclosed` instead: both limits, moved inward by the margin.
     margin : from the demonstrated bound to the nearest limit, negative outside.
-    bounds : the bounds on the probability, and so the verdict, hold for a "fixed number of cases" or, where that was
-        not fixed in advance, for "every number of cases" at once; None where there are none, as for a grid.
-    failing : of the joint verdict, the requirements that fail it where the fraction inside all limits does not.
+    bounds : validity of the bounds on the probability, and so of the verdict: for a "fixed number of cases" or, if that
+        was not fixed in advance, for "every number of cases" at once; None without bounds, as for a grid.
+    failing : for the joint verdict, the requirements that make it fail although its own fraction does not.
     """
 
     name: str
@@ -71,7 +75,7 @@ class RequirementRecord(_Record):
 
 
 class QuantileRecord(_Record):
-    """A quantile with its confidence interval; None for a bound that the cases are too few for."""
+    """A quantile with its confidence interval; None for a bound for which the cases are too few."""
 
     probability: float
     value: float
@@ -82,7 +86,7 @@ class QuantileRecord(_Record):
 class MetricRecord(_Record):
     """Statistics of a metric over the n_used cases, of n_tried, that have a number.
 
-    integration_change : the largest with half of the step, or a tenth of the tolerances, in the run's first cases
+    integration_change : largest change with half of the step, or a tenth of the tolerances, in the run's first cases
     """
 
     name: str
@@ -100,13 +104,13 @@ class MetricRecord(_Record):
 
 
 class ContributorRecord(_Record):
-    """Shares of a metric's variance.  input : a parameter, a group, "random draws" or "unexplained".
+    """Fractions of a metric's variance.  input : a parameter, a group, "random draws" or "unexplained".
 
-    first, total : effects, in [0, 1].  Without flights for the contributors, a total effect may be larger by up to what
-    is "unexplained", which its interval includes; parameters that name a random draw have no row then: what they do is
-    in "unexplained".
-    fall : the share by which the variance falls with the input at its nominal value, where that was flown; of "random
-    draws" the parameters that name a draw have theirs, and noise made in flight stays.
+    first, total : effects, in [0, 1].  Without flights for the contributors, a total effect may be larger by up to the
+    "unexplained" fraction, which is part of its interval; parameters that select a random draw then have no row of
+    their own, and their effect is in "unexplained".
+    fall : the fraction by which the variance falls with the input at its nominal value, if that was flown; for "random
+    draws", with the parameters that select a draw at theirs, while noise made in flight stays.
     """
 
     metric: str
@@ -148,10 +152,11 @@ class SectionRecord(_Record):
 
 
 class ReportRecord(_Record):
-    """What `report.json` holds.  contributor_flights : cases flown for the contributors alone; 0: from the table.
+    """The content of `report.json`.
 
-    probability, confidence : of all statistics but the requirements' own; each bound of a quantile holds with it.
-    joint : the verdict on all requirements at once, without a metric; None unless there are several.
+    contributor_flights : cases flown only for the contributors; 0: contributors were computed from the table.
+    probability, confidence : of all statistics except verdicts; each bound of a quantile has this confidence.
+    joint : the verdict on all requirements at once, without a metric; None for fewer than two.
     """
 
     format: Literal[1] = 1

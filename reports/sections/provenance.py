@@ -1,4 +1,4 @@
-"""Where the numbers come from: versions, digests, seed, machine kind and timing, enough to repeat the run."""
+"""Provenance of a run: versions, digests, seed, machine kind and timing, enough to repeat the run."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""Published values beside ours.
+"""Published values compared with ours.
 
 A record of the manifest's `published`:
 

@@ -1,4 +1,4 @@
-"""The scenario of a run: what flies, what happens when, what is assumed, and what is dispersed."""
+"""The scenario of a run: vehicle and campaign, timeline, assumptions and dispersions."""
 
 from collections.abc import Iterator
 

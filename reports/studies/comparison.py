@@ -1,4 +1,4 @@
-"""What `mc-engine compare A B --report FILE` writes: the comparison of two runs as a page or as a PDF."""
+"""The report of `mc-engine compare A B --report FILE`: the comparison of two runs as a page or as a PDF."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence

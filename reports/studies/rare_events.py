@@ -1,4 +1,4 @@
-"""The report of a rare event: how probable it is, how far that can be trusted, and what the failures look like."""
+"""The report of a rare event: its probability, the confidence in it, and the inputs of the failures."""
 
 from collections.abc import Iterator
 from typing import Any

@@ -1,4 +1,4 @@
-"""A tuning as its report sees it: the tables, its goals, and the front that is drawn."""
+"""The data of a tuning's report: the tables, the goals, and the front that is drawn."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -12,7 +12,7 @@ from reports.text.numbers import axis_label, exact, given_percent, number, with_
 
 
 class Tuned:
-    """A tuning with what its report asks of it.  name : of the directory, as commands in the report spell it."""
+    """A tuning with the data for its report.  name : of the directory, as written in commands in the report."""
 
     def __init__(self, record: TuningRecord, name: str):
         self.record = record

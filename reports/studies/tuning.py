@@ -1,4 +1,4 @@
-"""The report of a tuning: what was found, how it compares with what is published, and how the search went."""
+"""The report of a tuning: the front, validation against published results, and convergence of the search."""
 
 import re
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Numbers and names as a reader wants them: sensible digits, a true minus sign, units beside every name."""
+"""Numbers and names as text for readers: a suitable number of digits, a true minus sign, units with every name."""
 
 import re
 from collections.abc import Callable, Iterable, Sequence

@@ -1,4 +1,4 @@
-"""Places in a published source, told apart from the tables, figures and sections of the report itself."""
+"""References to a published source, distinguished from the tables, figures and sections of the report itself."""
 
 import re
 

@@ -9,10 +9,10 @@
 
     {{ figure("maps") }}
 
-A template sees `run` and, in the order of the command, `runs` (`RunFacts`), and places any table or figure of the
-report with `table(NAME)` and `figure(NAME)`, a line of its own each; NAME is the anchor of its section, -2, -3, ...
-for the further ones.  Values of the run are written as text: they are never read as Markdown, nor as Jinja.  The
-template runs in Jinja's sandbox, in a process with bounds: no imports, no files, no private members, 20 s, 512 MiB.
+A template can use `run` and, in the order of the command, `runs` (`RunFacts`).  It inserts tables and figures of the
+report by `table(NAME)` and `figure(NAME)`, each on its own line; NAME is the anchor of the section, with -2, -3, ...
+for further ones.  Values of the run are written as text, which is never read as Markdown or Jinja.  The template runs
+in Jinja's sandbox, in a limited process: no imports, no files, no private members, 20 s, 512 MiB.
 """
 
 import json
@@ -49,7 +49,7 @@ class TemplateError(EngineError):
 
 @dataclass(frozen=True)
 class RunFacts:
-    """A run as a template sees it.
+    """The data of a run for a template.
 
     data : by name, as plain data: name, title, design, seed, n_tried, n_ok, n_wanted; metrics (unit, n_used of n_tried,
         nominal, mean, sd, minimum, maximum), requirements (verdicts: outcome, passed, tried, share, confidence, lower,
@@ -64,7 +64,7 @@ class RunFacts:
 
 
 def run_facts(flown: Flown, title: str) -> RunFacts:
-    """What templates may say of a run."""
+    """The data of a run that templates can use."""
     metrics = {
         name: {
             "unit": flown.unit(name),

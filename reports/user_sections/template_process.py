@@ -1,8 +1,8 @@
 """The process that fills in a user's template: Jinja's sandbox, within bounds of memory and time.
 
-A template is text from anywhere.  The sandbox keeps it from files and from Python; that it ends, and leaves the memory
-to others, only a process of its own guarantees.  The two talk in lines of JSON: what the template may say comes in,
-and out come questions for quantiles, of which the caller has the numbers, and at last the text or the first fault.
+A template may come from anyone.  The sandbox keeps it from files and from Python; only a separate process guarantees
+that it ends and limits its memory.  The two processes exchange lines of JSON: the input is the data for the template;
+the output is requests for quantiles, which the caller answers, and finally the text or the first error.
 """
 
 import json
