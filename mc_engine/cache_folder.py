@@ -1,4 +1,4 @@
-"""Where the engine keeps what it can compute again: compiled kernels, designs of models, nominal flights of `check`."""
+"""The cache folder of the engine: compiled kernels, designs of models, nominal flights of `check`."""
 
 import os
 import stat
@@ -29,7 +29,7 @@ def cache_folder() -> Path:
 
 
 def _own_temporary_folder() -> Path:
-    """A temporary folder of this user alone, since what stands in it is run."""
+    """A temporary folder that only this user can write to, since code in it is run."""
     user = os.getuid() if hasattr(os, "getuid") else 0  # Windows has a temporary folder for every user
     folder = Path(tempfile.gettempdir()) / f"mc-engine-{user}"
     try:

@@ -1,4 +1,4 @@
-"""Python's search for unreachable objects: rare in a process that ends with its command, and none in a compilation."""
+"""Python's garbage collection: rare in a process that ends with its command, and off during compilation."""
 
 import atexit
 import gc
@@ -11,11 +11,11 @@ _IS_RARE = Event()
 
 
 def collect_rarely() -> None:
-    """Search for garbage only after many new objects, and not at the end of the process, whose memory goes with it.
+    """Collect garbage only after many new objects, and not at the end of the process, which frees all memory.
 
-    A command makes objects by the ten thousand and hardly any garbage.  As the interpreter ends it would search all of
-    them several times, which takes longer than to load numpy.  What `atexit` and `weakref.finalize` registered still
-    runs; `__del__` of objects in cycles that are there at the end does not, which Python does not promise either.
+    A command makes tens of thousands of objects and hardly any garbage.  When the interpreter ends, it would search all
+    of them several times, which takes longer than loading numpy.  Functions registered by `atexit` and
+    `weakref.finalize` still run; `__del__` of objects in cycles does not, which Python does not promise either.
     """
     gc.set_threshold(_NEW_OBJECTS)
     atexit.register(gc.freeze)
@@ -24,10 +24,10 @@ def collect_rarely() -> None:
 
 @contextmanager
 def without_collection() -> Iterator[None]:
-    """Compile without a search among the objects that numba makes by the million: it takes up to a tenth longer.
+    """Within the block, no garbage collection among the millions of objects of numba, which saves up to a tenth.
 
-    A compilation holds some tens of megabytes more.  After `collect_rarely` they are not searched behind it either;
-    what it leaves is found before the next compilation of the process, which few have.  Threads may compile at once.
+    A compilation takes some tens of megabytes more.  After `collect_rarely` they are not collected afterwards either,
+    but before the next compilation of the process, which few have.  Several threads may compile at the same time.
     """
     _SEARCH.stop()
     try:

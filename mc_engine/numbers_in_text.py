@@ -38,12 +38,12 @@ def counted(number: int, noun: str) -> str:
 
 
 def percent_digits(share: float) -> str:
-    """A share that somebody gave, in percent with all its digits: 99.996833 for 0.99996833."""
+    """A given fraction in percent, with all its digits: 99.996833 for 0.99996833."""
     return f"{(Decimal(f'{share:.{_GIVEN_DIGITS}g}') * 100).normalize():f}"
 
 
 def outward(value: float, decimals: int, up: bool) -> float:
-    """`value` to so many decimals, rounded up or down: what is printed of a bound claims no more than was shown."""
+    """`value` to this number of decimals, rounded up or down, so that a printed bound claims no more than was shown."""
     scaled = Decimal(repr(float(value))).scaleb(decimals)
     whole = (scaled - _SLACK if up else scaled + _SLACK).to_integral_value(ROUND_CEILING if up else ROUND_FLOOR)
     return float(whole.scaleb(-decimals)) + 0.0  # not -0

@@ -1,10 +1,11 @@
-"""Processes that this one began, directly or not: their memory, their end, and how it is told.
+"""Descendants of this process: their memory, how to end them, and how they ended, in words.
 
-Linux has the means to end every process that a program began, to see its memory while it runs, and to end it with the
-engine; elsewhere only its own process group is ended.
+On Linux, every process that a program began can be ended, its memory measured while it runs, and it ends with the
+engine.  On other systems only its own process group is ended.
 
 As a program, `python -m mc_engine.process_tree MODULE DESCRIPTOR FOLDER PARENT`, it is the guard of a process that runs
-foreign code, the `main` of the module: it ends with it whatever that began, also when the engine is killed.
+foreign code, the `main` of the module: with it, it ends all processes that this code began, also if the engine is
+killed.
 """
 
 import ctypes

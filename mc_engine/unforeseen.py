@@ -1,7 +1,7 @@
 """Unexpected errors on the command line: one sentence for the user, and a log file with the traceback.
 
-The exit status is UNFORESEEN, so that a script can tell such an error from a requirement that is not met.  In the
-Python interface unexpected errors are raised unchanged.
+The exit status is UNFORESEEN, so that a script can distinguish such an error from a requirement that is not met.  In
+the Python interface unexpected errors are raised unchanged.
 """
 
 import os

@@ -131,14 +131,14 @@ def nearest_unit(unit: str, allowed: Iterable[str]) -> str | None:
 
 
 def _may_be_misspelt(unit: str, typed: str) -> bool:
-    """Whether a slip may make one of the other: another letter in a short unit, as in kph and kPa, is another unit."""
+    """Whether `typed` may be a misspelt `unit`; another letter in a short unit, as in kph and kPa, is another unit."""
     letters, given = (_squeezed(name).replace("/", "") for name in (unit, typed))
     long = len(letters) > _SHORT and "/" not in unit
     return letters.isalpha() and (long or set(letters) == set(given) or given == f"{letters}s")
 
 
 def unit_hint(unit: str) -> str:
-    """End of a sentence about a unit not in UNITS: the nearest one, and where all of them are."""
+    """End of a sentence about a unit that is not in UNITS: the nearest one, and where all are listed."""
     near = nearest_unit(unit, UNITS)
     meant = f'; did you mean "{near}"?' if near else ""
     return f"{meant}; `mc-engine units` lists all {len(UNITS)}"

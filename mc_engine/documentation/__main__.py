@@ -1,4 +1,4 @@
-"""Build the site: `python -m mc_engine.documentation FOLDER`; exit status 1 if anything is amiss with a page."""
+"""Build the site: `python -m mc_engine.documentation FOLDER`; exit status 1 if a page has an error."""
 
 import argparse
 from pathlib import Path

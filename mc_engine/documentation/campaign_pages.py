@@ -1,4 +1,4 @@
-"""The reference of the shipped campaigns: their files, and every number that goes in and comes out."""
+"""The reference of the shipped campaigns: their files, and all inputs and results."""
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby

@@ -1,4 +1,4 @@
-"""The reference of functions and classes, from their definitions and docstrings, which are read and not run."""
+"""The reference of functions and classes, from their definitions and docstrings, read from the source files."""
 
 import ast
 import importlib.util
@@ -25,8 +25,8 @@ SECTIONS = {
 }
 _HEAD = """# Functions and classes
 
-`import mc_engine` gives the names that most programs need: NAMES. The rest is imported from the modules below.
-Docstrings give meaning, units, shapes and errors, and the source with its equation; arrays are written
+`import mc_engine` provides the names that most programs need: NAMES. Import all others from the modules below.
+The descriptions state meaning, units, shapes, errors, and the source with its equation; arrays are written
 `float64[n_cases, n_state]`.
 """
 Definition = ast.FunctionDef | ast.ClassDef

@@ -7,12 +7,12 @@ from mc_engine.units import UNITS, by_quantity
 
 _UNITS = """# Units
 
-What a model may declare, and a campaign file may give as `unit` of a dispersion in place of the parameter's own.
-Inside, all is SI and radians. The name of a column ends in its unit (`_days` for day, `_pct` for %); the name inside
-physics does not.
+A model may declare these units, and a campaign file may give one as the `unit` of a dispersion in place of the
+parameter's own. Physics is in SI and radians. The name of a column ends in its unit (`_days` for day, `_pct` for %);
+the name inside physics does not.
 `mc-engine units` prints the list.
 """
-_TERMS = "# Words of a report\n\nThe same as in the last section of every report.\n"
+_TERMS = "# Words of a report\n\nThe glossary in the last section of every report.\n"
 
 
 def units_page() -> str:

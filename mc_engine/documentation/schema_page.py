@@ -10,9 +10,9 @@ from mc_engine.documentation.markdown_text import code, escaped, table
 
 _HEAD = """# Keys of a campaign file
 
-Made from the JSON schema, which `mc-engine schema` prints for an editor. Nothing else is allowed in a file, and every
-mistake is reported at once, with its place and what was allowed (`mc-engine check FILE`). Numbers are in the units of
-the model's parameters and metrics, see the pages of the campaigns.
+Made from the JSON schema, which `mc-engine schema` prints for an editor. Other keys are errors. `mc-engine check FILE`
+reports all errors of a file at once, each with its location and the allowed values. Numbers are in the units of the
+model's parameters and metrics, see the pages of the campaigns.
 """
 
 
