@@ -219,11 +219,11 @@ class FixedStep:
     control_every : int or str, steps from one call of `control` to the next
     method : str, "rk4" (order 4), or for long smooth arcs "abm8" to "abm12", Adams-Bashforth-Moulton of order 8 to 12,
         or "gj6" to "gj10", Gauss-Jackson with differences of order 6 to 10, for models in which each state either is
-        the rate of another state or has a rate among the states.  Largest stable step, divided by the fastest angular
-        frequency [rad/s]: ABM 0.37, 0.26, 0.18, 0.12, 0.075 for the five orders; GJ 0.33, 0.24, 0.17, 0.12, 0.09, and
-        only with weak damping, see `mc_engine.lanes.gauss_jackson`.  Both methods start by DOP853, and restart so after
-        each event and each control sample that changes the discrete state.  `mc-engine check` also flies the nominal
-        case with half the step, and reports a step that is far too long.
+        the rate of another state or has a rate among the states.  A step is stable if step times the fastest angular
+        frequency [rad/s] is below 0.37, 0.26, 0.18, 0.12, 0.075 for the five orders of ABM; below 0.33, 0.24, 0.17,
+        0.12, 0.09 for GJ, and only with weak damping, see `mc_engine.lanes.gauss_jackson`.  Both methods start by
+        DOP853, and restart so after each event and each control sample that changes the discrete state.
+        `mc-engine check` also flies the nominal case with half the step, and reports a step that is far too long.
     rates : tuple of pairs (state, its rate) by their names without units, for GJ: the derivative of the first state of
         a pair is the second
 

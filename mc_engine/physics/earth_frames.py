@@ -59,27 +59,27 @@ def earth_rotation_angle(days):
 
 @physics
 def eci_to_ecef(v_eci, angle):
-    """Components in ECEF of a vector given in ECI.  angle : by which the Earth has rotated [rad]."""
+    """Components in ECEF of a vector given in ECI, at the rotation angle [rad] of the Earth."""
     s, c = sincos(angle)
     return Vector(c * v_eci.x + s * v_eci.y, c * v_eci.y - s * v_eci.x, v_eci.z)
 
 
 @physics
 def ecef_to_eci(v_ecef, angle):
-    """Components in ECI of a vector given in ECEF.  angle : as in `eci_to_ecef`."""
+    """Components in ECI of a vector given in ECEF, at the rotation angle [rad] of the Earth."""
     s, c = sincos(angle)
     return Vector(c * v_ecef.x - s * v_ecef.y, c * v_ecef.y + s * v_ecef.x, v_ecef.z)
 
 
 @physics
 def velocity_eci_to_ecef(r_eci, v_eci, angle, rate=EARTH_RATE):
-    """Velocity relative to the rotating Earth, in ECEF, of an inertial velocity: v - rate x r.  rate : [rad/s]"""
+    """Velocity relative to the Earth, rotating at a rate [rad/s], in ECEF, of an inertial velocity: v - rate x r."""
     return eci_to_ecef(Vector(v_eci.x + rate * r_eci.y, v_eci.y - rate * r_eci.x, v_eci.z), angle)
 
 
 @physics
 def velocity_ecef_to_eci(r_ecef, v_ecef, angle, rate=EARTH_RATE):
-    """Inertial velocity, in ECI, of a velocity relative to the rotating Earth: v + rate x r.  rate : [rad/s]"""
+    """Inertial velocity, in ECI, of a velocity relative to the Earth, rotating at a rate [rad/s]: v + rate x r."""
     return ecef_to_eci(Vector(v_ecef.x - rate * r_ecef.y, v_ecef.y + rate * r_ecef.x, v_ecef.z), angle)
 
 
@@ -162,7 +162,7 @@ def ned_from_ecef(latitude, longitude):
 
 @physics
 def ned_from_eci(latitude, longitude, angle):
-    """Matrix from ECI to NED.  angle : by which the Earth has rotated [rad]."""
+    """Matrix from ECI to NED, at a geodetic latitude and longitude and the rotation angle of the Earth [rad]."""
     return ned_from_ecef(latitude, longitude + angle)
 
 

@@ -271,8 +271,8 @@ def rocket_accelerations(rocket, fuel, rate, force, moment, weight):
     fuel : `Propellant`;  rate : of the body [rad/s];  force [N] : thrust and air, with its moment [N m] about the dry
     centre of mass;  weight : gravity [m/s^2]
 
-    Balance of momentum and angular momentum of the rocket's contents, with propellant on the axis; the second
-    derivative of the centre of mass is left out, as by G. H. Ceotto et al., J. Aerosp. Eng. 34(6), 2021.
+    Balance of momentum and angular momentum of all that is inside the rocket, with propellant on the axis; the second
+    derivative of the place of the centre of mass is left out, as by G. H. Ceotto et al., J. Aerosp. Eng. 34(6), 2021.
     RocketPy 1.13 differs in other terms: see "Replace a simulator by a compiled model, and prove it".
     """
     w, m = rate, rocket.mass + fuel.mass

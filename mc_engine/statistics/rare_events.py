@@ -120,7 +120,7 @@ class Flights:
 
 
 def interval_of_mean(estimates: np.ndarray, confidence: float) -> tuple[float, float]:
-    """(lower, upper) : confidence interval on the mean of the estimates of independent runs.
+    """Confidence interval (lower, upper) on the mean of the estimates of independent runs.
 
     Estimates by subset simulation are products and nearly log-normal: Cox's interval on the mean of a log-normal, with
     Student's t for the few runs, and ALLOWANCE.  If a run is zero, it is Student's interval on the mean, truncated at

@@ -206,7 +206,7 @@ class Store:
         return self._counted.committed()
 
     def missing(self, cases: int | range | None = None) -> list[Range]:
-        """The ranges that are not committed; cases : the first n, a range, or None for all of this directory."""
+        """The ranges that are not committed: among the first `cases`, in a range, or of all expected cases (None)."""
         expected = self.wanted if cases is None else cases if isinstance(cases, range) else range(cases)
         return self._counted.missing(expected)
 

@@ -86,9 +86,9 @@ class VerdictChange:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The comparison of run A (before) with run B (after).  By run, cases : flown; ok : completed; wanted : number of
-    cases of the complete run.
+    """The comparison of run A (before) with run B (after).
 
+    cases, ok, wanted : by run, the numbers of its cases, of completed ones, and of those of the complete run
     confidence : of every interval, that of B's [report].
     metrics in the order of B's columns; units by metric; left_out : metrics that are not compared, and why.
     """
