@@ -24,7 +24,7 @@ _SEED = 1  # of the bootstrap behind the intervals: the same cases give the same
 
 @dataclass(frozen=True)
 class DesignedIndices:
-    """Indices by name, float64[n_inputs, n_metrics], NaN where undefined; `reach` has the half widths of their intervals.
+    """Indices by name, float64[n_inputs, n_metrics], NaN where undefined; `reach` has their half intervals.
 
     Saltelli: "first_order" and "total", fractions of the metric's variance.  Morris: "mu_star", "mu" and "sigma", mean
     size, mean and standard deviation of the metric's change in a step of half the levels, divided by the step as a
