@@ -81,7 +81,7 @@ def fault_of(error: Exception, reference: str) -> str:
 
 
 def _hint_of_module(error: Exception) -> str:
-    """What to do about a module beside the model that one of its functions imports, when it runs."""
+    """The remedy for a module next to the model that one of its functions imports when it runs."""
     frame, _ = frame_in_model(error)
     if not isinstance(error, ModuleNotFoundError) or frame is None or frame.f_code.co_name == "<module>":
         return ""

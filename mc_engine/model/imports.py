@@ -20,7 +20,7 @@ _ENGINE = "mc_engine"
 
 
 class CapturedLoader(SourceFileLoader):
-    """Makes a module of the content that it is given.  name : of the module from then on, whatever it is imported as"""
+    """Makes a module from the given content.  name : of the module from then on, independent of its import"""
 
     def __init__(self, name: str, path: Path | str, content: bytes):
         super().__init__(name, str(path))
@@ -119,7 +119,7 @@ class _Beside(MetaPathFinder):
 
 
 def _is_asked_by_a_model() -> bool:
-    """Whether the import under way stands in a model: a library means its own modules, whatever lies beside a model."""
+    """Whether the current import is in a model: imports in a library never refer to files next to a model."""
     frame: FrameType | None = sys._getframe(2)
     while frame is not None and str(frame.f_globals.get("__name__")).partition(".")[0] == "importlib":
         frame = frame.f_back

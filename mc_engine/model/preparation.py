@@ -116,7 +116,7 @@ def _design(model: Model) -> str:
 
 
 def call_prepare(model: Model, inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> Any:
-    """What the model's `prepare` returns; ModelError with the line and the fix where it misuses what it is handed.
+    """The result of the model's `prepare`; ModelError with the line and the fix if it misuses its arguments.
 
     inputs, settings : float64[n_cases] by symbol, in SI.  Other errors come through as they are.
     """
@@ -133,7 +133,7 @@ def call_prepare(model: Model, inputs: SimpleNamespace, settings: SimpleNamespac
 
 
 def misuse(error: Exception, parameters: Sequence[Parameter]) -> str:
-    """The error of a wrong use of what `prepare` is handed, with the rules."""
+    """The error for a wrong use of the arguments of `prepare`, with the rules."""
     words = f"{type(error).__name__}: {error}"
     if isinstance(error, AttributeError) and isinstance(error.obj, SimpleNamespace):
         words += hint(str(error.name), vars(error.obj))

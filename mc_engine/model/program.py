@@ -175,7 +175,7 @@ def program_simulator(section: SimulatorSection, directory: Path, problems: Prob
 
 
 class Origin(NamedTuple):
-    """Where a described simulator is from: files by path, and what counts as its source beside them."""
+    """The origin of a described simulator: files by path, and what else is part of its source."""
 
     directory: Path
     contents: Mapping[Path, bytes]
@@ -225,9 +225,9 @@ def refuse_keys(section: SimulatorSection, keys: Sequence[str], why: str, proble
 def _command(
     section: SimulatorSection, directory: Path, contents: dict[Path, bytes], problems: Problems
 ) -> tuple[tuple[str, ...], str]:
-    """(words of the command, SHA-256 of an executable that does not lie beside the campaign file).
+    """(words of the command, SHA-256 of an executable that is not next to the campaign file).
 
-    A word that names a file beside the campaign file begins with {home} from then on.
+    In the result, a word that names a file next to the campaign file begins with {home}.
     """
     words, outside = [], ""
     for place, word in enumerate(section.command, start=1):
@@ -264,7 +264,7 @@ def _executable(word: str, problems: Problems) -> tuple[str, str]:
 
 
 def add_file(name: str, key: str, directory: Path, contents: dict[Path, bytes], problems: Problems) -> None:
-    """Read a file beside the campaign file."""
+    """Read a file next to the campaign file."""
     try:
         path = resolve_beside(directory, name)
         contents[path] = path.read_bytes()

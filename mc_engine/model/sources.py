@@ -96,7 +96,7 @@ sources_of_file(Path({file!r}))
 
 
 def leave_importable(sources: Sources | None, folder: Path) -> None:
-    """Let processes that this one spawns import a user's file and those beside it by the names that they have here.
+    """Let spawned processes import a user's file, and those next to it, by the names that they have in this one.
 
     folder : made for that, and put at the end of the import path, which the new processes take over.
     """
@@ -135,7 +135,7 @@ def _files_named(names: Iterable[str], folder: Path) -> dict[Path, bytes]:
 
 
 def sources_beside(file: Path) -> dict[Path, bytes]:
-    """Sources of a model that is a file: all beside it, and the folders beside it that they import, whole."""
+    """Sources of a model that is a file: all files next to it, and whole folders next to it that they import."""
     contents = {**_contents(file.parent.glob("*.py")), file: file.read_bytes()}
     waiting, seen = [file], set[str]()
     while waiting:

@@ -151,14 +151,14 @@ def _of_phase(function: Any, arguments: tuple[Any, ...]) -> Any:
 
 
 def _looks(model: Model, seen: Any) -> Any:
-    """What `evaluate` is handed as `best` where the outputs stay what they are.  seen : result of `observe`."""
+    """The argument `best` of `evaluate` for outputs that stay constant.  seen : result of `observe`."""
     best = namedtuple("Best", [extremum.name for extremum in model.extrema] or ["unused"])  # type: ignore[misc]
     names = [output.name for output in model.quantities]
     return best(*[seen[names.index(extremum.quantity)] for extremum in model.extrema] or [np.zeros(FEW)])
 
 
 def fixed_metrics(model: Model, p: Any, o: Any) -> dict[str, float]:
-    """Metrics, by name, in SI, that `evaluate` gives the same value whatever it is handed.
+    """Metrics, by name, in SI, to which `evaluate` gives the same value for all arguments.
 
     p, o : as in `run_through`, which the model has passed.  Everything that a flight or an input could change is given
     many values of either sign, near those of the start and over all the orders of magnitude of SI; a function that
