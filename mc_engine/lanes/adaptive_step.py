@@ -138,7 +138,7 @@ def _sense_of(kind, value, rate):
 
 @physics
 def best_value(kind, best, value, mask):
-    """Largest value of a peak, or not a number once a value was none; the present one of anything else."""
+    """Largest value of a peak, NaN once a value was NaN; for all other kinds the present value."""
     return where(mask & ((value > best) | (value != value) | (kind == LAST) | (kind == EVENT)), value, best)
 
 
@@ -160,7 +160,7 @@ def jump_time(kind, when, best, value, t, mask):
 
 @physics
 def is_lost(kind, value):
-    """Mask: the function of an event is not a number."""
+    """Mask: the function of an event is NaN."""
     return (kind == EVENT) & (value != value)
 
 

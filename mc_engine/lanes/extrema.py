@@ -74,10 +74,10 @@ def crest_value(best, unused, v0, v1, v2, t0, t1, t2, smooth, mask):
 
 @physics
 def crest_start(v0, v1, v2, back, first, last):
-    """Steps from the newest look to the vertex of the parabola through three neighbouring looks of one motion.
+    """Steps from the newest value to the vertex of the parabola through three neighbouring values of one motion.
 
-    back : of the middle one, steps before the newest.  first, last : masks of lanes where it is an end of its motion,
-    beside which half a step inwards is as good a start as any.
+    back : of the middle value, steps before the newest.  first, last : masks of lanes where it is an end of its motion;
+    there the search starts half a step inwards.
     """
     bend = v0 - 2.0 * v1 + v2
     shift = where(bend < 0.0, 0.5 * (v0 - v2) / where(bend < 0.0, bend, -1.0), 0.0)
@@ -98,7 +98,7 @@ def is_top(v0, v1, v2):
 
 @physics
 def is_inside(x, value, v1, low, high, smooth):
-    """Mask: a value between looks is taken, not that of the look beside it."""
+    """Mask: a value between grid points is taken, not the neighbouring one at a grid point."""
     return (smooth > 0.0) & (x > low) & (x < high) & (value > v1)
 
 
@@ -109,19 +109,19 @@ def top(inside, value, v1):
 
 @physics
 def top_time(inside, x, back, t, h):
-    """Time [s] of x steps of h after t, where the mask holds, else of the look `back` steps before t."""
+    """Time [s] of x steps of h after t where the mask holds; else of the grid point `back` steps before t."""
     return t + where(inside, x, -back) * h
 
 
 @physics
 def fall_start(w1, w2, back, falling):
-    """Steps from the newest look to the zero of the chord from the look `back` steps before it."""
+    """Steps from the newest value to the zero of the chord that begins at the value `back` steps before it."""
     return where(falling, w1 / where(falling & (w1 > w2), w1 - w2, 1.0), 0.5) - back
 
 
 @physics
 def nearer_zero(x, value, slope, back):
-    """One step of Newton's method to the zero of a value that falls, in the step after the look `back` steps before."""
+    """One step of Newton's method to the zero of a falling value, in the step that begins `back` steps before."""
     return minimum(maximum(x - where(slope < 0.0, value / where(slope < 0.0, slope, -1.0), 0.0), -back), 1.0 - back)
 
 

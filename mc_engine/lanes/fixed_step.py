@@ -127,7 +127,7 @@ track_by_three = compile_inline(_track_by_three)
 
 
 def _last_above(number, t, h, lanes, chords, lasts, last):
-    """Last times above zero after one more look; where it fell since the look before, by a chord in `chords`."""
+    """Last times above zero after one more value; if it fell since the one before, by a chord in lanes `chords`."""
     w1, w2 = lasts
     last = map_fields(extrema.above, last, w2, t, lanes)
     if any_lane(any_field(map_fields(extrema.falls, w1, w2, chords))):

@@ -49,7 +49,7 @@ def numbers_of(block: DataBlock) -> np.ndarray:
 def one_at(numbers, place):
     """The number at `place`, which is inside: nothing is checked, here and below.
 
-    A fraction of a place or row is left away; what is not a number must not come here.
+    The fraction of a place or row is dropped; neither may be NaN.
     """
     return _taken(numbers, place, 1)[0]
 

@@ -127,7 +127,7 @@ def record(typingctx, history, rows, lanes, time, fields):
 def unequal(typingctx, one, other, like):
     """Mask of the lanes in which any number of two records differs; records of lanes as wide as `like`.
 
-    What is not a number equals itself, such as the time of an event that has not happened yet.
+    A NaN equals itself here, such as the time of an event that has not happened yet.
     """
     result = mask_type(common_width(like))
 

@@ -1,4 +1,4 @@
-"""The lane number: W float64 values, one a case, in one LLVM vector; and its truth values.
+"""The lane number: W float64 values, one per case, in one LLVM vector; and its truth values.
 
 `Lanes(8)` maps to `<8 x double>`.  Operators take (lanes, lanes), (lanes, number) and (number, lanes); a
 plain number counts for every lane.  A mask, `Lanes(8, "m")`, comes from a comparison and knows `&`, `|`,
@@ -24,7 +24,7 @@ _TYPED: list[Any] = []  # the operators that know lanes
 
 
 class Lanes(types.Type):
-    """W float64 numbers (kind "f") or truth values (kind "m"), one a case."""
+    """W float64 numbers (kind "f") or truth values (kind "m"), one per case."""
 
     def __init__(self, width: int, kind: str = "f"):
         self.width, self.kind = width, kind

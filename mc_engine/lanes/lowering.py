@@ -82,7 +82,7 @@ def _choose(builder, width, args):
 
 
 def _handed_on(builder, width, tested, value):
-    """The value, and NaN where what is tested is not a number."""
+    """The value, but NaN where the tested number is NaN."""
     return builder.select(builder.fcmp_unordered("uno", tested, tested), constant(width, _NAN), value)
 
 
@@ -94,7 +94,7 @@ def _is_written_out(value):
 
 
 def _extreme(sign: str) -> Emit:
-    """Compare and select, not minnum, which drops what is not a number: the second number where they are equal."""
+    """Compare and select, because minnum ignores NaN; the second number where they are equal."""
 
     def emit(builder, width, args):
         x, y = args

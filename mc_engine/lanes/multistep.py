@@ -205,7 +205,7 @@ def _next_bend(slope, bend, ahead, part):
 
 
 def _form_differences(ring, differences, newest, like):
-    """Backward differences of the looks in a ring, at the newest, by their order."""
+    """Backward differences of the values in a ring buffer, at the newest, by their order."""
     for i in range(LOOKS):
         put_stage(differences, i, take_stage(ring, (newest + LOOKS - i) % LOOKS, like))
     for order in range(1, LOOKS):
@@ -273,7 +273,7 @@ smooth_of_differences = compile_callable(_smooth_of_differences)
 
 
 def _search_crest(looks, newest, back, t, h, count, lanes, smooth, best, when):
-    """(best, when) with the crests beside the look that is `back` steps before the newest, at t."""
+    """(best, when) with the crests next to the value that is `back` steps before the newest, at t."""
     place, newer, older = (newest - back) % LOOKS, (newest - max(back - 1, 0)) % LOOKS, (newest - back - 1) % LOOKS
     v1, v2, middle = take_stage(looks.peaks, place, best), take_stage(looks.peaks, newer, best), 0.0 * t + float(back)
     first, final = middle + 1.0 >= count, middle < 1.0
@@ -298,7 +298,7 @@ search_crest = compile_inline(_search_crest)
 
 
 def _search_fall(looks, newest, back, t, h, count, lanes, last):
-    """Last times above zero, with the falls between the look that is `back` steps before the newest and the next."""
+    """Last times above zero, with the falls between the value `back` steps before the newest and the next value."""
     w1 = take_stage(looks.lasts, (newest - back) % LOOKS, last)
     w2 = take_stage(looks.lasts, (newest - max(back - 1, 0)) % LOOKS, last)
     falls = map_fields(extrema.falls, w1, w2, lanes)
@@ -317,11 +317,11 @@ search_fall = compile_inline(_search_fall)
 
 
 def _search(looks, number, t, h, count, closing, lanes, smooth, best, when, last):
-    """Running extrema after a search on the polynomial: of crests beside the look two before the newest, since a corner
-    shows itself by the looks behind it, and of falls beside the one before; beside all before in lanes that have just
-    got the looks for it; if `closing` beside the last two, and beside all where looks are fewer.
+    """Running extrema after a search on the polynomial: for crests next to the value two before the newest, as a corner
+    is recognised by the values after it, and for falls next to the one before; next to all earlier ones in lanes that
+    have just got enough values; if `closing`, next to the last two, or to all if there are fewer.
 
-    number, t : of the newest look, its time [s];  count : how many looks its motion has had
+    number, t : of the newest value, its time [s];  count : number of values of its motion
     """
     newest, nearest = number % LOOKS, 0 if closing else 1
     form_differences(looks.peaks, looks.peak_differences, newest, best)
@@ -343,9 +343,9 @@ search = compile_callable(_search)
 
 
 def _track_by_all(looks, number, t, h, closing, lanes, count, smooth, seen, lasts, best, when, last):
-    """Running extrema after a look that may change them, or that belongs to a motion of few looks.
+    """Running extrema after a value that may change them, or that belongs to a motion with few values.
 
-    count : how many looks the motion has had, this one included
+    count : number of values of the motion, including this one
     """
     ended = lanes & (count <= looks.count) & (looks.count >= 4.0)
     if any_lane(ended):

@@ -90,7 +90,7 @@ def _known(arguments: tuple[Any, ...]) -> Origin | None:
 
 
 def taking_numbers(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function of floats that gives a Number where it is handed one."""
+    """A function of floats that also takes Numbers, and then returns one."""
 
     signature = inspect.signature(function)
 
