@@ -211,7 +211,7 @@ def name_upstream(campaign: Campaign, case_ids: np.ndarray, flight: Columns) -> 
 
 
 def _lost_rows(campaign: Campaign, lost: Sequence[Lost], names: Sequence[str]) -> Mapping[str, Any]:
-    """The rows of cases that were not flown: inputs, status and reason; all else is not a number."""
+    """The rows of cases that were not flown: inputs, status and reason; all other numbers are NaN."""
     if not lost:
         return {}
     ids = np.array([case.case_id for case in lost], dtype=np.int64)

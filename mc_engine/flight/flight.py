@@ -66,7 +66,7 @@ def _unflown(model: Model, refusals: Refusals) -> tuple[np.ndarray, ...]:
 
 
 def _columns(model: Model, refusals: Refusals, out: tuple[np.ndarray, ...]) -> dict[str, np.ndarray]:
-    """Results as columns.  out : time, status, states and metrics as kernels give them; not a number where refused."""
+    """Results as columns.  out : time, status, states and metrics as kernels give them; NaN for refused cases."""
     for numbers in out:
         numbers[np.isnan(numbers)] = np.nan  # processors and cards give it different signs
     time, status, states, metrics = out
@@ -340,7 +340,7 @@ class _Recorder:
         return out, counts
 
     def _together(self, counts: np.ndarray) -> int:
-        """How many cases with so many rows there is memory for; always for one."""
+        """Number of cases, at least one, for which there is memory, with these numbers of rows."""
         return max(1, int(_MOST_NUMBERS // (self._n_fields * counts.max())))
 
     def _fly_once(self, chosen: np.ndarray, pace: np.ndarray, room: float) -> tuple[tuple[np.ndarray, ...], np.ndarray]:

@@ -49,7 +49,7 @@ class Flown(NamedTuple):
     left_out: tuple[str, ...] = ()
 
     def row(self, names: Sequence[str]) -> dict[str, Any]:
-        """Status, reason and metrics by column; a metric that is not there is not a number."""
+        """Status, reason and metrics by column; NaN for a metric that is missing."""
         metrics = {name: self.metrics.get(name, float("nan")) for name in names}
         return {"status": STATUS_NAME[self.status], "reason": self.reason, **metrics}
 
