@@ -199,10 +199,10 @@ def _in_units(name: str, unit: str) -> str:
 def _axis(points: np.ndarray) -> np.ndarray:
     """Header, buckets and points of one argument; the place of what follows is left open.
 
-    A bucket is (number of a point at or before it, that point, the two behind it).  Buckets are numbered by the very
-    operations of a look-up, which keep the order whatever they round to: a point of an earlier bucket lies before all
-    arguments of this one.  So only the points of an argument's own bucket are left to be compared with it, two by
-    their values in the bucket.  Where some bucket has more, up to 2**levels - 1, they are bisected.
+    A bucket is (number of a point at or before it, that point, the two after it).  Buckets are numbered by the same
+    operations as in a look-up, which keep the order with any rounding: a point of an earlier bucket is before all
+    arguments of this one.  So an argument is compared only with the points of its own bucket, with two of them by
+    their values in the bucket.  If a bucket has more points, up to 2**levels - 1, they are bisected.
     """
     low, high, n = points[0], points[-1], points.size
     buckets = n - 1
@@ -224,9 +224,9 @@ def _axis(points: np.ndarray) -> np.ndarray:
 
 @physics
 def _segment(numbers, at, x):
-    """(number of the point at or before x, way from it to x, whether x is outside); outside, x is held.
+    """(number of the point at or before x, distance from it to x, whether x is outside); outside, x is held.
 
-    at : place of the axis.  The way is not a number where x is not one; the number of the point always is.
+    at : index of the axis.  For a NaN x the distance is NaN, but the number of the point is valid.
     """
     low, high, scale, last = row_of_four(numbers, at, 0)
     levels, points, buckets, _ = row_of_four(numbers, at, 1)

@@ -58,7 +58,7 @@ def geodetic_latitude(x, y, z, altitude, polar_radius, e2):
 def velocity_angles(x, y, z, vx, vy, vz):
     """(flight-path angle, heading) [rad] of a velocity at a position, both in the same axes, z to the north pole.
 
-    Exactly on the axis, x = y = 0, both angles are 0, whatever the velocity.
+    Exactly on the axis, x = y = 0, both angles are 0 for any velocity.
     """
     p2 = x * x + y * y
     outward = x * vx + y * vy

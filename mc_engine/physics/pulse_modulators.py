@@ -100,7 +100,7 @@ def _switched(sample, command, m):
 
 @physics
 def _without_cycles(sample, command, m):
-    """The sample with all whole cycles taken out of what is left, where it has just switched and will again.
+    """The sample without all whole cycles in its remaining time, where it has just switched and will again.
 
     A cycle is a pulse and a pause, as long as the lag takes between its thresholds; after it all is as it was before.
     """

@@ -249,6 +249,6 @@ from_euler_321, to_euler_321 = euler_sequence("321")
 
 @physics
 def advanced(b_from_a, rate_b, duration):
-    """b_from_a after a duration [s] at a constant rate [rad/s] in axes of b: exact, whatever the angle."""
+    """b_from_a after a duration [s] at a constant rate [rad/s] in axes of b: exact for any angle."""
     turn = Vector(rate_b.x * duration, rate_b.y * duration, rate_b.z * duration)
     return product(b_from_a, from_rotation_vector(turn))

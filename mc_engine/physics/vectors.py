@@ -1,4 +1,4 @@
-"""Vectors of three components, in whatever frame and unit the caller names: `r_ecef`, `v_body`.
+"""Vectors of three components, in any frame and unit, which the names of variables state: `r_ecef`, `v_body`.
 
 Written for named tuples with the fields x, y, z, such as `Vector`; results are `Vector`s.  Components may be numbers,
 lanes or arrays.
