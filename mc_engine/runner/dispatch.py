@@ -111,7 +111,7 @@ class Dispatch:
         return self._under_way < min(self._pool.room(), self._most or self._pool.room())
 
     def _needs_pool_alone(self, task: Task) -> bool:
-        """Whether no other task may run beside this one, so that its worker can die of this one only."""
+        """Whether no other task may run at the same time, so that only this one can kill its worker."""
         return self._pool.shared and bool(task.alone)
 
     def _on_worker_death(self, result: Result) -> None:

@@ -161,7 +161,7 @@ def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, 
     Quantiles are the usual ones, and those between which a case lies with the probability of [report]; each bound of a
     quantile has its confidence.  Designs without random sampling, such as a grid, have no quantiles.
 
-    A failed case has no value, whatever its row contains.
+    A failed case has no value, even if its row contains a number.
     """
     known = [column.name for column in store.columns if column.role == "metric"]
     names = known if metrics is None else list(metrics)
@@ -257,7 +257,7 @@ def summary_lines(metric: str, summary: "Summary", unit: str, random: bool) -> l
 
 
 def _digits(summary: "Summary") -> int:
-    """Significant digits that tell the cases apart: eight, or more where the spread is small, as of Julian dates."""
+    """Significant digits that distinguish the cases: eight, or more if the spread is small, as for Julian dates."""
     largest = max(abs(summary.minimum or 0.0), abs(summary.maximum or 0.0))
     if summary.constant or not largest or not summary.sd or not isfinite(summary.sd):
         return _DIGITS
