@@ -1,5 +1,5 @@
-"""Published values of a model's source, in the table `published.toml` beside the model: what is printed, and how ours
-is computed.
+"""Published values of a model's source, in the file `published.toml` next to the model: the printed values, and how our
+values are computed.
 
 [source]
 campaign = "de-orbit"         # the campaign in two words
@@ -111,13 +111,13 @@ def _checked(path: Path, contents: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def read_source(path: Path) -> Source:
-    """The work that a published.toml is about; its folder's name and nothing, where the file does not say."""
+    """The source of a published.toml: campaign and work; if not stated, the name of its folder and ""."""
     said = _read(path).get("source", {})
     return Source(str(said.get("campaign", path.resolve().parent.name)), str(said.get("work", "")))
 
 
 def lock_file(path: Path) -> Path:
-    """The generated file beside a published.toml that keeps the computed values."""
+    """The generated file next to a published.toml that stores the computed values."""
     return path.with_name("published.lock.toml")
 
 
@@ -215,7 +215,7 @@ def half_a_unit(number: float) -> float:
 
 
 def shown_digits(printed: Value) -> int:
-    """Significant digits of ours that are shown: as many as the print has, six at least."""
+    """Number of significant digits shown of our value: that of the printed value, but at least six."""
     return 6 if isinstance(printed, str) else max(6, len(Decimal(repr(printed)).normalize().as_tuple().digits))
 
 

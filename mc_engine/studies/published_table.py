@@ -55,7 +55,7 @@ def campaign_table(path: Path, values: Mapping[str, Value] | None = None) -> str
 
 
 def _improvements(records: Sequence[Record]) -> Iterator[str]:
-    """The table of what another computation than the source's improves, and by how much."""
+    """The table of values that a better computation than the source's improves, and by how much."""
     ours = [record for record in records if "better" in record]
     if not ours:
         return
