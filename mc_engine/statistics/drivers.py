@@ -265,9 +265,9 @@ def _scores(column: InputColumn) -> list[np.ndarray]:
 def _pair_tests(columns: Sequence[InputColumn], failed: Mapping[str, np.ndarray]) -> Iterator[Driver]:
     """The test of every pair of inputs, for each requirement; where its cases fail is not yet looked for.
 
-    The score of a pair and the failures are both freed from what the single inputs give (regression on scores and
-    their squares); what is left of the two must not correlate.  Of the variance with and without equal spread over the
-    cases (White, Econometrica 48 (1980), 817-838) the larger is taken.
+    The scores of a pair and the failures are regressed on the scores of the single inputs and their squares; without an
+    effect of the pair, the residuals of the two are uncorrelated.  The larger of two variances is used: with and
+    without equal spread over the cases (White, Econometrica 48 (1980), 817-838).
     """
     scored = [
         (column.name, score) for column in columns if len(column.levels) <= MOST_LEVELS for score in _scores(column)
@@ -295,9 +295,9 @@ def _pair_tests(columns: Sequence[InputColumn], failed: Mapping[str, np.ndarray]
 
 
 def _studentised(product: np.ndarray, freed: np.ndarray, factor: float) -> np.ndarray:
-    """Sum of product times what is left of the failures over its standard error, float64[n_products, n_requirements].
+    """Sum of product times failure residuals over its standard error, float64[n_products, n_requirements].
 
-    A product that the single inputs give exactly tells nothing: 0.
+    0 for a product that the single inputs determine exactly.
     """
     square, left = product**2, freed**2
     equal = square.sum(axis=0)[:, None] * left.mean(axis=0)

@@ -381,7 +381,7 @@ class _Fit:
 def _value_row(widths: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """First row of the inverses of normal matrices, from their eigenvalues and eigenvectors.
 
-    Terms that the cases do not tell apart are left out.
+    Terms that the cases cannot distinguish are left out.
     """
     determined = widths > 1e-10 * widths[:, -1:]
     return np.einsum(

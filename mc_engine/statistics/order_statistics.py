@@ -37,7 +37,7 @@ class Quantile:
 
 
 def quantile_ranks(n: int, probability: float, confidence: float = 0.90) -> tuple[int | None, int | None]:
-    """Ranks of the order statistics that bracket a quantile, whatever the distribution.
+    """Ranks of the order statistics that bracket a quantile of any distribution.
 
     n : int, number of independent cases
     probability : float in (0, 1), 0.5 for the median

@@ -10,11 +10,11 @@ If the number of cases was decided while looking at the results (`looked`), the 
 which hold at every number of cases; else those of `binomial`, which hold for a number fixed in advance.
 
 Several requirements.  Each verdict has the confidence that its requirement asks for.  The joint verdict counts the
-cases inside every limit at once, and requires of them 1 minus the sum of what each requirement may miss: if each is
-met, so is that (Boole).  It passes if that probability is demonstrated and every requirement passes, which then holds
-with the smallest of their confidences (Berger, Technometrics 24 (1982), 295-300).  It fails if one of these tests fails
-with the error allowed, 1 - confidence, divided by their number (Bonferroni); `shared_outcome` is each verdict at that
-confidence, and those hold all at once.
+cases inside all limits at once.  Its required probability is 1 minus the sum of the failure probabilities that the
+requirements allow, which follows if every requirement is met (Boole).  It passes if this probability is demonstrated
+and every requirement passes; it then has the smallest of their confidences (Berger, Technometrics 24 (1982), 295-300).
+It fails if one of these tests fails with the allowed error, 1 - confidence, divided by their number (Bonferroni).
+`shared_outcome` is each verdict at that confidence; these verdicts hold together.
 """
 
 from collections.abc import Callable, Mapping, Sequence

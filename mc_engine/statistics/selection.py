@@ -36,7 +36,7 @@ class Selection:
     """One pass of several: counts the next digit of the keys that begin as a wanted one does, or keeps these keys.
 
     wanted : by rank (1 ... n) the leading digits of its key found so far, as one number, and the rank that is left
-    among the values with this beginning.  The first pass counts all values, whatever will be wanted.
+    among the values with this beginning.  The first pass counts all values, before the ranks are known.
     few : whether so few values have these beginnings that they are kept.
     """
 

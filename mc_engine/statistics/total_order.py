@@ -125,7 +125,7 @@ def _orthonormal(raw: Sequence[np.ndarray], degree: Sequence[int]) -> _Functions
 
 
 def _steps(columns: Sequence[InputColumn], left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Share of what is left that single inputs give after all, by their bins, with its error; 0 if within chance."""
+    """Fraction of the residuals that single inputs explain by their bins, with its error; 0 if within chance."""
     share, error = np.zeros((2, len(columns), left.shape[1]))
     open_ = left.var(axis=0) > _NEARLY_ALL
     for index, column in enumerate(columns if open_.any() else []):
@@ -155,12 +155,12 @@ class _Fit:
 
     @property
     def noise(self) -> float:
-        """Variance of what is left, with the part that the fit itself took away put back."""
+        """Variance of the residuals, corrected for the degrees of freedom of the fit."""
         return float((self.left**2).sum() / max(len(self.y) - 1 - len(self.terms), 1))
 
 
 def _surrogate(basis: Sequence[_Functions], low: np.ndarray, y: np.ndarray) -> _Fit:
-    """First single inputs, then pairs that what is left depends on, then triples of inputs that act in pairs."""
+    """First single inputs, then pairs that the residuals depend on, then triples of inputs that act in pairs."""
     groups: list[Group] = [(index,) for index in range(len(basis))]
     fit = _extended(basis, _refit(basis, _Fit((), np.empty((y.size, 0)), np.empty(0), y, y), []), groups)
     pairs: set[Group] = set()
@@ -177,7 +177,7 @@ def _surrogate(basis: Sequence[_Functions], low: np.ndarray, y: np.ndarray) -> _
 
 
 def _extended(basis: Sequence[_Functions], fit: _Fit, groups: Sequence[Group]) -> _Fit:
-    """The fit with those products of the groups' functions that what is left correlates with beyond chance."""
+    """The fit, extended by those products of the groups' functions that correlate significantly with the residuals."""
     most = min(MOST_TERMS, fit.y.size // CASES_PER_TERM)
     for _ in range(_PASSES):
         room = most - len(fit.terms)
@@ -197,7 +197,7 @@ def _extended(basis: Sequence[_Functions], fit: _Fit, groups: Sequence[Group]) -
 def _candidates(
     basis: Sequence[_Functions], groups: Sequence[Group], left: np.ndarray
 ) -> tuple[list[Term], np.ndarray]:
-    """All products up to MOST_DEGREE, and the correlation of each with what is left, in standard errors."""
+    """All products up to MOST_DEGREE, and the correlation of each with the residuals, in standard errors."""
     terms: list[Term] = []
     scores = []
     for group in groups:
@@ -240,7 +240,7 @@ def _refit(basis: Sequence[_Functions], fit: _Fit, fresh: Sequence[Term]) -> _Fi
 
 
 def _acting_pairs(basis: Sequence[_Functions], low: np.ndarray, left: np.ndarray) -> list[Group]:
-    """Pairs of inputs whose products of low degree what is left depends on, strongest first.
+    """Pairs of inputs on whose products of low degree the residuals depend, strongest first.
 
     low : their functions of low degree side by side.  Without a pair the sum of the squared scores of its products
     is chi-squared; Bonferroni over all pairs.
