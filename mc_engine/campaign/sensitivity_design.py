@@ -195,7 +195,8 @@ def _point_columns(
 ) -> list[np.ndarray]:
     """Uniform numbers of the k-th point of each block, a column a dispersion, correlated as the campaign's.
 
-    A and B are one point of a scrambled Sobol' sequence with twice the dimensions; C and random draws are random.
+    A and B are one point of a scrambled Sobol' sequence with twice the dimensions; C, and inputs that select a random
+    draw, are random numbers.
     """
     streams = [f"{name}/{DESIGN} {_POINTS[k]}" for name in names]
     columns = list(uniform_columns(campaign.seed, streams, blocks))
