@@ -37,17 +37,23 @@ def _is_set_out(paragraph: str) -> bool:
 
 
 def _flowing(paragraph: str) -> str:
-    """Running text, or a list where each line that names something begins an item."""
-    if not re.search(r"^\S.* : ", paragraph, re.MULTILINE):
-        return "\n".join(escaped(line.strip()) for line in paragraph.split("\n"))
+    """Running text, and a list in which each line that begins with the name of an argument begins an item."""
+    text: list[str] = []
     items: list[str] = []
     for line in paragraph.split("\n"):
-        starts = re.match(r"\S[^ ].* : |\S : ", line) is not None
-        if starts or not items:
-            items.append(escaped(line.strip()))
-        else:
+        if _begins_item(line):
+            items.append(f"- {escaped(line.strip())}")
+        elif items:
             items[-1] += " " + escaped(line.strip())
-    return "\n".join(f"- {item}" for item in items)
+        else:
+            text.append(escaped(line.strip()))
+    return "\n".join([*text, *[""] * bool(text and items), *items])
+
+
+def _begins_item(line: str) -> bool:
+    """Whether it begins with a name and " : ", unlike a name behind a sentence, which is running text."""
+    name, colon, _ = line.partition(" : ")
+    return bool(colon) and not line.startswith(" ") and not re.search("[.;:] ", name)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

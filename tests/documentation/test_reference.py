@@ -56,10 +56,11 @@ def test_every_public_function_of_the_reference_has_a_docstring():
             assert bare == [], path.name
 
 
-def test_prose_is_never_read_as_markup_and_columns_stay_columns():
+def test_prose_is_never_read_as_markup_and_columns_and_arguments_stay():
     assert escaped("x*x and `y*y`, a_b [m] <n>") == r"x\*x and `y*y`, a\_b \[m\] \<n\>"
     assert escaped("- dash") == r"\- dash"
     assert prose("One line.\n\nn : number of cases\nx : values,\n    finite") == (
         "One line.\n\n- n : number of cases\n- x : values, finite"
     )
+    assert prose("Force [N].  m : [kg]\na, b : [m]") == "Force \\[N\\].  m : \\[kg\\]\n\n- a, b : \\[m\\]"
     assert "```text\nshift    of the mean\n" in prose("shift    of the mean\nspread   of the rest")
