@@ -1,7 +1,7 @@
 """What the flights of many cases have in common: envelopes of a history quantity over the time."""
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import count, pairwise
 
 import numpy as np
 import pandas as pd
@@ -28,10 +28,15 @@ def envelope_probabilities(n_cases: int) -> tuple[float, ...]:
 def fair_cases(flown: Flown) -> list[int]:
     """Of the cases with a saved history those that stand for all: 0, 1, 2, ... up to the first gap; none of a design.
 
-    A case further on may have been kept because it is one of the worst; a band over such cases would be too wide.
+    A case further on may have been kept because it is one of the worst; a band over such cases would be too wide.  A
+    failed case without a history, such as a refused one, is no gap.
     """
     kept = sorted(case for case in flown.histories["case_id"].unique().tolist() if case >= 0 and flown.random)
-    return [case for place, case in enumerate(kept) if case == place]
+    if not kept:
+        return []
+    known = {*kept, *flown.every.failed(kept[-1] + 1)["case_id"].tolist()}
+    gap = next(case for case in count() if case not in known)
+    return [case for case in kept if case < gap]
 
 
 def history_envelopes(histories: pd.DataFrame, case_ids: Sequence[int], names: Sequence[str]) -> dict[str, Envelope]:

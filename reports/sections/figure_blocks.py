@@ -277,13 +277,15 @@ def _envelope_words(flown: Flown, envelopes: dict[str, Envelope]) -> Iterator[st
     sizes = {envelope.n_cases for envelope in envelopes.values()}
     if sizes:
         n = sizes.pop()
+        lost = fair_cases(flown)[-1] + 1 - n
+        without = f" ({counted(lost, 'failed case')} among them left no history)" if lost else ""
         outer = outer_percentile(n)
         why = (
             f", the outermost that {count(n)} cases support; {percent(OUTER[0], 3)} needs {count(ceil(1.0 / OUTER[0]))}"
         )
         yield (
             f"Envelopes: smallest to largest, {percent(outer, 3)} to {percent(1.0 - outer, 3)}"
-            f"{why if outer > OUTER[0] else ''}, and median of the first {count(n)} cases, "
+            f"{why if outer > OUTER[0] else ''}, and median of the first {count(n)} saved cases{without}, "
             f"at every time of those that still fly: of fewer than {FEWEST_CASES}, smallest to largest alone. "
             "These cases were saved whatever their result."
         )

@@ -57,7 +57,7 @@ def _band_words(flown: Flown, figure: ProfileFigure, bands: tuple[Envelope, ...]
     ways = " and ".join("up" if band.rising else "down" for band in bands)
     again = "climbs" if not bands[0].rising else "descends"
     return (
-        f" The envelopes are of {x} at equal {y} on the way {ways}, over the first {bands[0].n_cases} cases. "
+        f" The envelopes are of {x} at equal {y} on the way {ways}, over the first {bands[0].n_cases} saved cases. "
         f"Of a flight that {again} again, the first way {'up' if bands[0].rising else 'down'} to a level counts; "
         f"a level that fewer than {FEWEST_CASES} flights reach has no band."
     )

@@ -1,7 +1,5 @@
 """Percentile bands over the histories of many cases."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,6 +9,7 @@ from synthetic_run import synthetic_run
 from reports.contents import build
 from reports.drawing import paper, screen
 from reports.drawing.marks import Band, Line
+from reports.run.flown import Flown
 from reports.run.history_bands import fair_cases, history_envelopes
 
 TIMES = np.linspace(0.0, 10.0, 101)
@@ -93,8 +92,21 @@ def test_a_handful_of_cases_makes_no_band():
 def test_only_cases_kept_for_no_reason_are_in_a_band():
     """The nominal is no case; 7 and 90 were kept because they are among the worst."""
     for saved, fair in (([-1, 0, 1, 2, 3, 4, 7, 90], [0, 1, 2, 3, 4]), ([-1, 3, 4], [])):
-        run = SimpleNamespace(histories=pd.DataFrame({"case_id": np.repeat(saved, 3)}), random=True)
-        assert fair_cases(run) == fair
+        run = synthetic_run(100, failed=0)
+        run.manifest["campaign"]["design"], run.history = "mc", pd.DataFrame({"case_id": np.repeat(saved, 3)})
+        assert fair_cases(Flown(run, "run")) == fair
+
+
+def test_a_failed_case_without_a_history_is_no_gap_and_is_counted():
+    """Of first = 30 the cases 2 and 9 were refused: a report of 28 histories said that envelopes need 20."""
+    run = synthetic_run(100, failed=0)
+    run.table.loc[[2, 9], "status"] = "refused"
+    saved = histories(np.ones(30)).rename(columns={"x_m": "force_n"})
+    run.history = saved[~saved["case_id"].isin([2, 9])].reset_index(drop=True)
+    assert fair_cases(Flown(run, "run")) == [case for case in range(30) if case not in (2, 9)]
+    said = repr(build(run, "run"))
+    assert "median of the first 28 saved cases (2 failed cases among them left no history)" in said
+    assert "Envelopes need" not in said
 
 
 @pytest.fixture(scope="module")

@@ -47,7 +47,7 @@ def test_the_band_is_the_quantile_of_the_speeds_at_each_altitude():
 
 def test_the_report_says_how_many_flights_and_how_skips_are_counted():
     block = profile(build(landing_run(60), "run"))
-    assert "over the first 25 cases" in block.caption
+    assert "over the first 25 saved cases" in block.caption
     assert "the first way down to a level counts" in block.caption
     assert any("25 saved cases" in mark.key for mark in block.drawing.key)
     json.dumps(screen.specifications(block.drawing), allow_nan=False)
