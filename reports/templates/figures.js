@@ -87,7 +87,11 @@ const reportFigures = (function () {
         if (!shown.has(byPanel.get(entry.target))) draw(byPanel.get(entry.target));
       }
     }, { rootMargin: "600px 0px" });
-    for (const panel of byPanel.keys()) watch.observe(panel);
+    // What is in sight from the start is there with the first picture of the page, which is all that a screenshot takes.
+    const inSight = (box) => box.height > 0 && box.top < window.innerHeight && box.bottom > 0;
+    const first = [...byPanel.keys()].filter((panel) => inSight(panel.getBoundingClientRect()));
+    for (const panel of first) draw(byPanel.get(panel));
+    for (const panel of byPanel.keys()) if (!first.includes(panel)) watch.observe(panel);
     dark.addEventListener("change", () => repaint(false, false));
     window.addEventListener("beforeprint", () => forPaper(true));
     window.addEventListener("afterprint", () => forPaper(false));

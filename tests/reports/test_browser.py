@@ -228,6 +228,22 @@ def box_over(page, figure, left, right):
     )
 
 
+def lone_figure(folder, title=""):
+    plot = Plot((Line(np.arange(3.0), np.arange(3.0), "@ink"),), Axis("time [s]"), Axis(), title)
+    own = Section("own", "Own", (FigureBlock("Lines", Drawing("Curves", (plot,))),))
+    document = replace(build(synthetic_run(60), "run"), verdicts=(), costs=(), sections=numbered((own,)))
+    (folder / "report.html").write_bytes(render_html(document))
+    return folder / "report.html"
+
+
+def test_figures_in_sight_are_there_with_the_first_picture_of_the_page(browser, tmp_path):
+    """A screenshot that was taken as soon as the page was loaded had empty frames."""
+    count = f"addEventListener('DOMContentLoaded', () => requestAnimationFrame(() => {{ first = {DRAWN}; }}))"
+    browser.ask("Page.addScriptToEvaluateOnNewDocument", source=count)
+    browser.open(lone_figure(tmp_path))
+    assert browser.run("first") == [3]
+
+
 def test_a_box_counts_every_case_of_the_run_also_where_a_figure_draws_only_some(browser, tmp_path):
     run = synthetic_run(5000)
     file = tmp_path / "report.html"
@@ -346,12 +362,7 @@ def test_nothing_reaches_beyond_a_printed_page(browser, file):
 
 
 def test_a_title_of_two_lines_is_in_its_panel(browser, tmp_path):
-    title = "the mean deviation of the longitude over a whole day"
-    plot = Plot((Line(np.arange(3.0), np.arange(3.0), "@ink"),), Axis("time [s]"), Axis(), title)
-    own = Section("own", "Own", (FigureBlock("Lines", Drawing("Curves", (plot,))),))
-    document = replace(build(synthetic_run(60), "run"), sections=numbered((own,)))
-    (tmp_path / "report.html").write_bytes(render_html(document))
-    browser.open(tmp_path / "report.html")
+    browser.open(lone_figure(tmp_path, "the mean deviation of the longitude over a whole day"))
     browser.until(f"{DRAWN}.every(Boolean)")
     lines = "[...document.querySelectorAll('.gtitle .line')].map((line) => line.getBoundingClientRect())"
     panel = "document.querySelector('.panel').getBoundingClientRect().top"
