@@ -120,8 +120,9 @@ class Verdict:
     def remark(self) -> str:
         """Why a joint verdict differs from the one of its own count; else empty."""
         if self.failing:
-            verb = "fails" if len(self.failing) == 1 else "fail"
-            return f"{' and '.join(self.failing)} {verb} with confidence shared"
+            *others, last = self.failing
+            who = f"{', '.join(others)} and {last} fail" if others else f"{last} fails"
+            return f"{who} with confidence shared"
         alone = not self.metric and self.outcome == NOT_DEMONSTRABLE
         if alone and self.lower is not None and self.lower >= self.share:
             return "not every requirement is demonstrated by itself"

@@ -27,17 +27,18 @@ def companion_blocks(flown: Flown, contributions: Contributions) -> Iterator[Fig
     if shown:
         yield _effect_figure(flown, contributions, shown)
         yield _effect_table(flown, contributions, shown)
-    yield from no_contributors(flown, [metric for metric in key if metric not in shown])
+    silent = [metric for metric in key if metric not in shown]
+    yield from no_contributors(flown, silent, "blocks" if contributions.trends is None else "cases")
     others = sum(metric not in key and bool(rows) for metric, rows in contributions.by_metric.items())
     if others:
         yield f"The effects on {counted(others, 'other metric')} are in report.json."
 
 
-def no_contributors(flown: Flown, silent: list[str]) -> Iterator[str]:
-    """A sentence on metrics whose contributors are not known."""
+def no_contributors(flown: Flown, silent: list[str], used: str = "cases") -> Iterator[str]:
+    """A sentence on metrics whose contributors are not known; used : what indices rest on, cases or blocks of them."""
     if silent:
-        names = ", ".join(flown.words(metric) for metric in silent)
-        yield f"No contributors for {names}: the same in all cases that have it, or fewer than {FEWEST_CASES} of them."
+        few = f"fewer than {FEWEST_CASES} {used} with a number"
+        yield f"No contributors for {flown.listed(silent)}: the same in all cases that have it, or {few}."
 
 
 def _effect_figure(flown: Flown, contributions: Contributions, shown: list[str]) -> FigureBlock:

@@ -14,7 +14,7 @@ from reports.drawing.marks import Drawing
 from reports.figures.statistics import success_panel
 from reports.run.flown import Flown
 from reports.run.outcomes import failures
-from reports.text.numbers import count, number, percent
+from reports.text.numbers import count, number, p_value, percent
 
 MOST_DRIVERS = 12
 MOST_PANELS = 6
@@ -117,7 +117,7 @@ def _driver_row(flown: Flown, driver: Driver, failed: Mapping[str, np.ndarray]) 
         Cell(" with ".join(flown.words(name) for name in driver.inputs)),
         Cell(" with ".join(driver.where)),
         Cell(number(driver.effect, 2), driver.effect),
-        Cell(number(driver.adjusted, 2), driver.adjusted),
+        Cell(p_value(driver.adjusted), driver.adjusted),
         Cell(inside),
     )
 

@@ -74,7 +74,7 @@ def worst_tables(flown: Flown) -> Iterator[Table]:
             yield _case_table(flown, _worst_words(flown, metric), metric, cases)
     failed = flown.n_tried - flown.every.completed
     if failed:
-        title = f"Failed cases: the first {min(FAILED_SHOWN, failed)} of {count(failed)}"
+        title = "Failed cases" + (f": the first {FAILED_SHOWN} of {count(failed)}" if failed > FAILED_SHOWN else "")
         yield _case_table(flown, title, None, flown.every.failed(FAILED_SHOWN))
 
 

@@ -29,7 +29,7 @@ def correlation_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     table = {name: flown.values(name)[rows] for name in [*metrics[:MOST_METRICS], *_inputs(flown, metrics)]}
     table = {name: values for name, values in table.items() if _varies(values)}
     if len(table) < 2:
-        yield "Not drawn: fewer than two key metrics or inputs differ between the cases."
+        yield "Not drawn: of the key metrics and their contributors, fewer than two differ between the cases."
         return
     names = list(table)
     rho, fewest = rank_correlations(np.array(list(table.values())))

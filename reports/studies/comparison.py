@@ -32,9 +32,19 @@ from reports.run.chosen_units import ShownRun, chosen_unit
 from reports.run.flown import Flown
 from reports.studies.comparison_figure import change_figure
 from reports.studies.comparison_overlays import overlay_blocks
-from reports.text.numbers import SPACE, axis_label, count, counted, fixed, given_percent, number, percent, words
+from reports.text.numbers import (
+    SPACE,
+    axis_label,
+    count,
+    counted,
+    fixed,
+    given_percent,
+    number,
+    p_value,
+    percent,
+    words,
+)  # fmt: skip
 
-LEAST_P = 1e-12  # a smaller p-value means no more
 ROUNDING = 1e-12  # of a mean: a smaller standard deviation is none
 GLOSSARY = Terms(
     (
@@ -294,7 +304,7 @@ def _estimate_cell(estimate: Estimate) -> Cell:
 def _p_value_cell(value: float, alpha: float) -> Cell:
     if not np.isfinite(value):
         return Cell("no test")
-    text = number(value, 2) if value >= LEAST_P else f"<{SPACE}{number(LEAST_P, 2)}"
+    text = p_value(value)
     return Cell(f"{text}{SPACE}*" if value <= alpha else text, value)
 
 

@@ -165,9 +165,13 @@ def _verdict_card(result: dict[str, Any]) -> Card:
 
 
 def _cost_cards(result: dict[str, Any]) -> Iterator[Card]:
-    wider = "is a fifth wider than this error gives" if result["method"] != "plain" else "is Clopper and Pearson’s"
+    interval = {
+        "plain": "is Clopper and Pearson’s",
+        "subset": "is a fifth wider than the scatter of the runs gives (log-normal, Student’s t)",
+        "cross-entropy": "is a fifth wider than this error gives",
+    }[result["method"]]
     if (error := result["relative_error"]) is not None:
-        yield Card("standard error", percent(error, 1), f"of the probability; the interval {wider}.")
+        yield Card("standard error", percent(error, 1), f"of the probability; the interval {interval}.")
     plain = result["plain_cases"]
     if plain is not None and result["method"] != "plain":
         yield Card(

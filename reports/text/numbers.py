@@ -19,6 +19,7 @@ LONGEST_SYMBOL = 3  # letters
 LONGEST_LABEL = 44  # letters of an axis label, without its unit
 SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _NEGLIGIBLE = 1e-6  # of a spread
+_LEAST_P = 1e-12  # a smaller p-value says no more
 
 
 def count(number: int) -> str:
@@ -157,6 +158,11 @@ def percentile(probability: float) -> str:
     text = percent_digits(probability)
     ending = {"1": "st", "2": "nd", "3": "rd"}.get(text[-1], "th") if text[-2:-1] != "1" else "th"
     return f"{text}{ending} percentile"
+
+
+def p_value(value: float) -> str:
+    """A p-value: 0.012, or < 1·10⁻¹²."""
+    return number(value, 2) if value >= _LEAST_P else f"<{SPACE}{number(_LEAST_P, 2)}"
 
 
 def exact(value: float | str | bool) -> str:

@@ -1,5 +1,7 @@
 """Requirement verdicts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import binom
@@ -177,6 +179,8 @@ def test_a_joint_verdict_names_the_requirement_that_fails_it_alone():
     joint = judge_all([FUEL, {**SPEED, "share": 0.5}], table.__getitem__, np.ones(2000, dtype=bool))[1]
     assert (joint.outcome, joint.failing) == ("fail", ("fuel",))
     assert joint.remark == "fuel fails with confidence shared"
+    three = replace(joint, failing=("fuel", "load", "miss"))
+    assert three.remark == "fuel, load and miss fail with confidence shared"
     passing = both(np.full(5000, 0.5), np.full(5000, 6.0))[1]
     assert (passing.outcome, passing.failing, passing.remark) == ("pass", (), "")
 

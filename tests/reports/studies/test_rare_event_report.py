@@ -68,6 +68,10 @@ def test_the_headline_is_the_probability_against_what_is_allowed(tmp_path):
     (card,) = document.verdicts
     assert (card.answer, card.tone) == ("met", "good")
     assert f"{interval}; allowed: 0.0027 with 90\u202f% confidence. Source: tank." in card.detail
+    wider = "the interval is a fifth wider than the scatter of the runs gives (log-normal, Student’s t)."
+    assert document.costs[0].detail.endswith(
+        wider
+    )  # "than this error gives" before: of ten runs it is up to twice as wide
     assert document.costs[1].detail.startswith("Plain Monte Carlo needs 2\u202f960\u202f000 for the same")
 
 

@@ -16,6 +16,7 @@ from reports.text.numbers import (
     limit_number,
     named,
     number,
+    p_value,
     percent,
     percentile,
     spelled,
@@ -107,6 +108,10 @@ def test_a_share_that_was_given_has_all_its_digits(share, text):
 )  # fmt: skip
 def test_a_percentile_has_the_ending_of_its_last_digits(probability, name):
     assert percentile(probability) == f"{name} percentile"
+
+
+def test_a_p_value_is_never_zero():
+    assert (p_value(0.0123), p_value(0.0)) == ("0.012", "<\u202f1·10⁻¹²")
 
 
 def test_a_count_is_grouped_in_threes():
