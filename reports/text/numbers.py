@@ -102,8 +102,8 @@ def column_texts(values: Sequence[float | None]) -> list[str]:
     numbers = [value for value in values if value is not None and isfinite(value)]
     distinct = sorted(set(numbers))
     apart = [b for a, b in pairwise(distinct) if not nearly_equal(a, b)]
-    if not apart:
-        return [number(value, 4) for value in values]
+    if not apart:  # a number such as a Julian date keeps its fraction
+        return [number(value, 4 if value is None or abs(value) < 1e4 else MOST_DIGITS) for value in values]
     largest, spread = max(map(abs, numbers)), distinct[-1] - distinct[0]
     if largest < 1e7 and (spread >= 1e-5 or largest >= 1e-4):
         whole = all(value.is_integer() for value in map(float, numbers))

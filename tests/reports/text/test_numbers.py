@@ -61,6 +61,13 @@ def test_values_of_a_narrow_column_have_the_same_decimals():
     assert column_texts([0.0003248, 0.00032436, 0.00032495]) == ["0.00032480", "0.00032436", "0.00032495"]
 
 
+def test_equal_julian_dates_of_a_column_keep_their_fraction():
+    """Half a day was rounded up to the next day."""
+    assert column_texts([2459000.5000030, 2459000.5000029]) == ["2\u202f459\u202f000.5"] * 2
+    assert column_texts([2459000.0, None]) == ["2\u202f459\u202f000", "–"]
+    assert column_texts([1.0 / 3.0, 1.0 / 3.0]) == ["0.3333", "0.3333"]
+
+
 def test_whole_numbers_of_a_column_have_no_decimals():
     assert column_texts([0.0, 1.0, None, 1.0]) == ["0", "1", "–", "1"]
     assert column_texts([0.0, 1.0, 0.5]) == ["0.00", "1.00", "0.50"]
