@@ -129,6 +129,12 @@ class Comparison:
         return tuple(metric.metric for metric in self.metrics if metric.same)
 
     @property
+    def same_words(self) -> str:
+        """What holds for the metrics of `same`."""
+        lacking = any(metric.same and min(metric.n_used) < max(metric.n_tried) for metric in self.metrics)
+        return "the same in both runs" + ", in the cases with a number in both" * lacking
+
+    @property
     def absent(self) -> tuple[str, ...]:
         """The metrics without a number in one of the runs."""
         return tuple(metric.metric for metric in self.metrics if not metric.same and not finite(metric.shift))

@@ -81,7 +81,7 @@ def _metric_table(comparison: Comparison) -> Iterator[str]:
     if any(_NO_INTERVAL in cell for row in rows for cell in row):
         yield f"{_NO_INTERVAL}: the cases, or those that differ between the runs, are too few for one"
     if comparison.same:
-        yield f"the same in both runs: {', '.join(comparison.same)}"
+        yield f"{comparison.same_words}: {', '.join(comparison.same)}"
     if comparison.absent:
         yield f"without a number in one of the runs: {', '.join(comparison.absent)}"
 

@@ -225,7 +225,7 @@ def _metric_blocks(comparison: Comparison, units: Mapping[str, str]) -> Iterator
     if moved:
         yield _metric_table(comparison, units, moved)
     if comparison.same:
-        yield f"The same in both runs: {_listed(comparison, comparison.same)}."
+        yield f"{comparison.same_words.capitalize()}: {_listed(comparison, comparison.same)}."
     if comparison.absent:
         yield f"Without a number in one of the runs: {_listed(comparison, comparison.absent)}."
 

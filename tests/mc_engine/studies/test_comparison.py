@@ -88,6 +88,8 @@ def test_failed_cases_are_a_share_that_changed(tmp_path):
     assert [one.name for one in found.moved_shares] == ["completed", "fuel"]
     assert (found.shares[0].lost, found.shares[0].gained) == (40, 0)
     assert found.metrics[0].n_used == (360, 360)
+    said = "\n".join(comparison_lines(found))  # 40 cases of run A have numbers that nothing is compared with
+    assert "the same in both runs, in the cases with a number in both: propellant_kg" in said
 
 
 def test_a_requirement_that_stands_worse_on_the_same_cases_is_a_change(tmp_path):

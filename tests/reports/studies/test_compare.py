@@ -175,7 +175,7 @@ def test_the_same_run_twice_has_no_figure_and_says_so():
     assert document.subtitle.startswith("No significant change")
     assert not list(blocks_of(document, FigureBlock))
     page = render_html(document).decode()
-    assert "The same in both runs: correction impulse" in page
+    assert "The same in both runs, in the cases with a number in both: correction impulse" in page
     assert "Code: the same in both runs." in page
 
 
