@@ -1,6 +1,9 @@
 """The headline box: which requirements are met, with what confidence, and the key results."""
 
 from collections.abc import Iterator
+from math import tau
+
+import numpy as np
 
 from mc_engine.model.figures import MapFigure
 from mc_engine.statistics import Summary, Verdict
@@ -8,6 +11,7 @@ from mc_engine.statistics.requirements import EXTENSIBLE
 from mc_engine.statistics.worst import Limits
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.store.run_files import NO_NOMINAL
+from mc_engine.units import UNITS
 from reports.document.blocks import Card
 from reports.run.flown import URGENCY, Flown
 from reports.sections.convergence import MUCH
@@ -16,6 +20,7 @@ from reports.sections.tables import TONES, limit_text
 from reports.text.numbers import count, given_percent, limit_number, number, percent, percentile, with_unit
 
 MOST_COSTS = 4
+NEAR_A_TURN = 0.95  # of a full turn, between the smallest and the largest angle
 
 
 def verdict_cards(flown: Flown) -> tuple[Card, ...]:
@@ -160,7 +165,8 @@ def warnings(flown: Flown) -> tuple[str, ...]:
         sentences.append(f"{every} failed: no metric has a number.")
     elif failed := flown.n_tried - flown.every.completed:
         sentences.append(
-            f"{count(failed)} of {count(flown.n_tried)} cases failed; they count against every requirement."
+            f"{count(failed)} of {count(flown.n_tried)} cases failed; "
+            f"{'it counts' if failed == 1 else 'they count'} against every requirement."
         )
     status, reason = (str(flown.nominal.get(name) or "") for name in ("status", "reason"))
     if reason == NO_NOMINAL:
@@ -186,6 +192,7 @@ def warnings(flown: Flown) -> tuple[str, ...]:
             f"With {flown.integration.by}, {flown.listed(coarse)} would change by more than {number(MUCH)} standard "
             "deviations: the error of integration is not small beside the spread (see Convergence)."
         )
+    sentences += [sentence for name in flown.summaries if (sentence := _jump(flown, name))]
     if not flown.random:
         sentences.append(
             f"The design is “{flown.design}”: its cases are chosen, not drawn at random. "
@@ -193,6 +200,27 @@ def warnings(flown: Flown) -> tuple[str, ...]:
             "probabilities."
         )
     return tuple(sentences)
+
+
+def _jump(flown: Flown, name: str) -> str:
+    """That an angle has cases near both ends of a full turn and more than half a turn without any; else empty."""
+    unit = UNITS.get(flown.unit(name))
+    if unit is None or unit.quantity != "angle":
+        return ""
+    values, turn = np.sort(flown.values(name)), tau / unit.factor
+    values = values[np.isfinite(values)]
+    if values.size < 2 or not NEAR_A_TURN * turn < values[-1] - values[0] <= turn * (1.0 + 1e-12):
+        return ""
+    gap = int(np.argmax(np.diff(values)))
+    below, above = values[gap], values[gap + 1]
+    if above - below <= 0.5 * turn:
+        return ""
+    between = f"{number(below, 4)} and {with_unit(number(above, 4), flown.unit(name))}"
+    return (
+        f"{flown.words(name)}: the cases lie near both ends of a full turn, none between {between}. Statistics and "
+        "verdicts take an angle as a plain number: if this one jumps by a turn, they are wrong, and the metric should "
+        "be the difference from a reference angle."
+    )
 
 
 def _how_looked_at(flown: Flown) -> str:

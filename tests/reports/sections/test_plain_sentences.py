@@ -83,6 +83,15 @@ def test_zeros_are_found_by_the_units_of_the_columns_and_not_beside_infinities_a
         assert [name for name in sizes if flown.undrawn(name)] == ["cross_km"]
 
 
+@pytest.mark.parametrize(("low", "high", "told"), [(355.0, 365.0, True), (0.0, 360.0, False), (100.0, 260.0, False)])
+def test_an_angle_that_jumps_by_a_turn_between_cases_is_a_warning(low, high, told):
+    """Of a longitude of 0 deg ± 5 deg the report gave a mean of 182 deg, a σ of 178 deg, and a verdict on them."""
+    run = synthetic_run(400, failed=3)
+    run.table["entry_flight_path_angle_deg"] = np.linspace(low, high, 400) % 360.0
+    warnings = " ".join(build(run, "run").warnings)
+    assert ("entry flight path angle: the cases lie near both ends of a full turn, none between" in warnings) is told
+
+
 @pytest.mark.parametrize("run", [narrow(0.1), narrow(1e-4, 7800.001)])
 def test_a_larger_spread_and_one_that_a_limit_is_on_are_drawn(run):
     assert "entry speed [m/s]" in drawn_labels(build(run, "run"))
