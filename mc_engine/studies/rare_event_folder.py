@@ -67,9 +67,10 @@ def probability_words(result: dict[str, Any]) -> str:
     allowed, sure = 1.0 - result["requirement"]["share"], percent_digits(result["requirement"]["confidence"])
     allows = f"the requirement allows {allowed:.3g} with {sure} % confidence"
     lower, upper = printed_interval(result)
+    of = f"{percent_digits(result['confidence'])} % interval"
     if not result["probability"]:
-        return f"below {upper:.3g}; no case was outside the limit ({allows})"
-    interval = f"{percent_digits(result['confidence'])} % interval {lower:.3g} to {upper:.3g}"
+        return f"below {upper:.3g}, the upper end of the {of}; no case was outside the limit ({allows})"
+    interval = f"{of} {lower:.3g} to {upper:.3g}"
     return (
         f"{result['probability']:.3g} of not meeting it, {interval}, by {METHOD_WORDS[result['method']]}; "
         f"{allows}, so it is {standing(result)}"

@@ -123,7 +123,7 @@ def build_rare_event(record: RareEventRecord, name: str) -> Document:
 def _estimate_sentence(result: dict[str, Any]) -> str:
     event = f"P({_event(result)})"
     if not result["probability"]:
-        return f"No case failed: {event} < {number(printed_interval(result)[1], 3)}. Requirement {standing(result)}."
+        return f"No case failed: {event} < {_bound(result)}. Requirement {standing(result)}."
     return f"{event} = {number(result['probability'], 3)} ({_interval(result)}). Requirement {standing(result)}."
 
 
@@ -138,6 +138,12 @@ def _event(result: dict[str, Any]) -> str:
 def _interval(result: dict[str, Any]) -> str:
     lower, upper = printed_interval(result)
     return f"{given_percent(result['confidence'])} confidence interval {number(lower, 3)} to {number(upper, 3)}"
+
+
+def _bound(result: dict[str, Any]) -> str:
+    """What the probability is below where no case failed."""
+    end = f"upper end of the {given_percent(result['confidence'])} confidence interval"
+    return f"{number(printed_interval(result)[1], 3)} ({end})"
 
 
 def _estimate_facts(record: RareEventRecord) -> tuple[tuple[str, str], ...]:
@@ -158,7 +164,7 @@ def _verdict_card(result: dict[str, Any]) -> Card:
     answer = standing(result)
     found = f"Probability of failure {number(result['probability'], 3)}, {_interval(result)}"
     if not result["probability"]:
-        found = f"No case failed: probability of failure below {number(printed_interval(result)[1], 3)}"
+        found = f"No case failed: probability of failure below {_bound(result)}"
     sure = given_percent(result["requirement"]["confidence"])
     detail = f"{found}; allowed: {number(allowed, 3)} with {sure} confidence.{source}"
     return Card(result["requirement"]["name"], answer, detail, TONES[answer])

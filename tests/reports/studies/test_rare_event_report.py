@@ -88,7 +88,7 @@ def test_the_printed_interval_holds_the_one_that_was_found(tmp_path):
     assert "interval 1.49·10⁻⁵ to 2.71·10⁻⁵" in build_rare_event(record, "out").subtitle
     assert "interval 1.49e-05 to 2.71e-05" in probability_words(record.result)
     none = {**record.result, "probability": 0.0, "lower": 0.0, "upper": 2.9956e-4}  # 1 - 0.05**(1/10000)
-    assert probability_words(none).startswith("below 0.0003;")
+    assert probability_words(none).startswith("below 0.0003, the upper end of the 95 % interval;")
 
 
 def test_levels_and_failed_inputs_are_listed_and_drawn(tmp_path):
@@ -115,10 +115,11 @@ def test_without_a_failed_case_the_report_says_below(tmp_path):
         remarks=["The probability is smaller than 1.2e-14."],
     )
     document = build_rare_event(record, "out")
-    assert document.subtitle == "No case failed: P(fuel > 2.5\u202fkg) < 0.0003. Requirement met."
+    bound = "0.0003 (upper end of the 95\u202f% confidence interval)"
+    assert document.subtitle == f"No case failed: P(fuel > 2.5\u202fkg) < {bound}. Requirement met."
     assert document.warnings == ("The probability is smaller than 1.2·10⁻¹⁴.",)
     assert document.verdicts[0].detail.startswith(
-        "No case failed: probability of failure below 0.0003; allowed: 0.0027 with 90\u202f% confidence."
+        f"No case failed: probability of failure below {bound}; allowed: 0.0027 with 90\u202f% confidence."
     )
     assert document.costs == ()  # there is no standard error of nothing
     assert "add up" not in repr(document.sections[0])
