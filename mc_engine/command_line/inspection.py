@@ -118,6 +118,7 @@ def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE"
     if store.missing(range(case, case + 1)):
         leave(USAGE, f"{folder}: case {case} is not there; the run has {ranges(store.committed())}")
     from mc_engine.runner import runner
+    from mc_engine.runner.summary import failure_words
     from mc_engine.studies.replay_files import write_replay
 
     flight = runner.replay(folder, case)
@@ -131,7 +132,11 @@ def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE"
     else:
         within = f"within the tolerance of its simulator, {flight.tolerance:g} of the number"
         typer.echo(f"case {case}: every stored number is {within}; bits were not compared")
-    if store.manifest.get("quantities"):  # a simulator without outputs has no history
+    if failed := failure_words(flight.row):
+        typer.echo(f"case {case} {failed}")
+    if store.manifest.get("quantities") and not len(flight.history):
+        typer.echo(f"case {case} has no history")
+    elif store.manifest.get("quantities"):  # a simulator without outputs has no history
         try:
             for path in write_replay(store, case, flight.history, replay_picture(store, case, flight.history)):
                 typer.echo(str(path))

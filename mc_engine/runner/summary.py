@@ -72,9 +72,13 @@ def case_line(store: Store) -> str:
 def nominal_line(store: Store) -> str:
     """That the nominal case failed, with status and reason, or was not imported; empty where it is ok."""
     row = store.nominal()
-    failed = row.get("status", STATUS_NAME[OK]) != STATUS_NAME[OK]
-    if not failed or row["reason"] == NO_NOMINAL:
-        return NO_NOMINAL if failed else ""
+    return NO_NOMINAL if row.get("reason") == NO_NOMINAL else failure_words(row)
+
+
+def failure_words(row: Mapping[str, Any]) -> str:
+    """Such as "failed: refused, the mass is negative"; empty for a case that is ok."""
+    if row.get("status", STATUS_NAME[OK]) == STATUS_NAME[OK]:
+        return ""
     return f"failed: {', '.join(str(row[name]) for name in ('status', 'reason') if row[name])}"
 
 

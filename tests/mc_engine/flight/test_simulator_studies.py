@@ -66,6 +66,14 @@ def test_a_cluster_makes_the_same_run(tmp_path, flown, kind):
     assert np.allclose(table["fall_time_s"], flown.cases()["fall_time_s"], rtol=1e-12, atol=0.0)
 
 
+def test_a_replay_of_a_refused_case_says_why_and_draws_no_empty_picture(tmp_path):
+    ball = python_campaign(tmp_path / "ball", cases=3, fault="raise Refuse('the ball is lost')")
+    flown = run(load_campaign(ball), tmp_path / "run", workers=1)
+    said = told("replay", flown.path, 1)
+    assert "case 1 failed: refused, the ball is lost\ncase 1 has no history\n" in said
+    assert not (flown.path / "replay").exists()
+
+
 def test_two_simulators_are_compared_case_by_case(tmp_path, flown):
     other = run(load_campaign(program_campaign(tmp_path / "ball", cases=60)), tmp_path / "run", workers=2)
     said = told("compare", flown.path, other.path)
