@@ -43,7 +43,7 @@ from reports.text.numbers import (
     p_value,
     percent,
     words,
-)  # fmt: skip
+)
 
 ROUNDING = 1e-12  # of a mean: a smaller standard deviation is none
 GLOSSARY = Terms(
