@@ -20,7 +20,7 @@ from mc_engine.physics.frames import TURN
 # Coasts and burns of the source's corrections [s], and the signs that bring the drift to zero.
 PUBLISHED = ((123_753.6, 7_726.3, 1.0), (37_692.0, 4_569.1, 1.0), (24_264.7, 1_290.3, -1.0))
 E_PLANNED = 0.6  # of the tolerance: leaves the dispersions of thrust and pointing their part
-PASSES = 6
+PASSES = 20  # where little is left for the last correction, each pass only halves what is lacking
 SETTLED = 1e-3  # of the tolerances: a plan is done when its flight ends as near as that to what was aimed at
 DV_OF_COST = 0.1  # m/s that one unit of expected cost is worth: a plan may spend so much to be surer of its end
 
@@ -86,7 +86,8 @@ def design(craft: Craft) -> Plan:
     """Corrections and coasts that end at the place, with the drift asked for and a small eccentricity.
 
     The source's successive approximations: the plan of the drift model that costs least is flown with finite burns in
-    the full dynamics, and what the model lacks at the end is added to the next plan's aim; two or three passes settle.
+    the full dynamics, and what the model lacks at the end is added to the next plan's aim; most settle in two or three
+    passes.
     Coasts [s], corrections [m/s].
     """
     limits, lacking = limits_of(craft.o), End(0.0, 0.0, 0.0, 0.0)
@@ -94,7 +95,10 @@ def design(craft: Craft) -> Plan:
     for _ in range(PASSES):
         improved = [better for start in starts if (better := _improved(craft, limits, lacking, start))]
         if not improved:
-            raise ModelError("no phasing plan meets the limits on coasts, time, last correction and eccentricity")
+            raise ModelError(
+                "no phasing plan was found within the limits on coasts, time, last correction and eccentricity; "
+                "another aim or number of corrections may do"
+            )
         _, plan = min(improved, key=lambda pair: pair[0])
         _, flown = craft.fly_plan(plan)
         if abs(flown.y) < SETTLED * limits.y and abs(flown.v - craft.o.aim_drift) < SETTLED * limits.v:

@@ -23,8 +23,13 @@ _DAY = 86_400.0
 
 
 def terrestrial_time(mjd_utc: np.ndarray) -> np.ndarray:
-    """Modified Julian date in terrestrial time of one in UTC."""
-    tai = erfa.utctai(_MJD, np.asarray(mjd_utc, dtype=np.float64))
+    """Modified Julian date in terrestrial time of one in UTC.
+
+    After the last leap second that pyerfa knows none is added, and before 1960 UTC is taken as TAI: half a minute at
+    most, in which the Moon goes on by 17".
+    """
+    # the bare function: `erfa.utctai` warns of every date before 1960 or some years ahead
+    *tai, _ = erfa.ufunc.utctai(_MJD, np.asarray(mjd_utc, dtype=np.float64))
     tt = erfa.taitt(*tai)
     return (tt[0] - _MJD) + tt[1]
 

@@ -101,6 +101,13 @@ def test_the_values_of_the_source_digest():
     assert np.linalg.norm(moon) == pytest.approx(1e8 * np.hypot(np.hypot(2.5508, 2.8094), 0.8567), rel=1e-3)
 
 
+@pytest.mark.parametrize("epoch", [33_300.0, 65_000.0])
+def test_dates_before_utc_and_years_ahead_are_no_cause_for_warnings(epoch):
+    """Warnings are errors in tests; the leap seconds of 2017 are the last that are known."""
+    assert 0.0 < 86_400.0 * (float(terrestrial_time(epoch)) - epoch) < 69.2
+    assert 0.0 <= float(sidereal_angle(epoch)) < 2.0 * np.pi
+
+
 @pytest.mark.parametrize("epoch", EPOCHS)
 def test_sidereal_time_is_that_of_the_older_series_and_turns_once_in_a_sidereal_day(epoch):
     assert sidereal_angle(epoch) == pytest.approx(erfa.gmst82(2_400_000.5, epoch), abs=np.radians(0.2 / 3600.0))
