@@ -26,6 +26,10 @@ def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -
         "the initial orbit is not above the entry interface to come down to",
     )
     refusals.add(i.gain * settings.step > 0.3, "gain_1_s times step_s is above 0.3: the step is too long for the law")
+    refusals.add(
+        (settings.control == CHOICES.control.pulsed) & (i.modulator_time_constant < settings.step),
+        "modulator_time_constant_s is below step_s: the step is too long for the modulator",
+    )
     to_perigee, ahead = path_axes(path.omega, i.inclination)
     f_desired, deviation = first_deviation(path, i, to_perigee, ahead)
     return {

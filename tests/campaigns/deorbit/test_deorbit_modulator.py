@@ -82,3 +82,11 @@ def test_the_step_does_not_move_the_pulses(step):
     row = fly_one(**PULSED, step_s=step)
     assert row["pulse_count"] == 5
     assert row["correction_impulse_m_s"] == pytest.approx(50.43748, abs=1e-4)
+
+
+def test_a_step_too_long_for_the_modulator_is_refused():
+    """At 0.3 s the lag of steps of 1 s would run off and fire no pulse; there are 1448."""
+    fast = PULSED | {"modulator_time_constant_s": 0.3}
+    assert fly_one(**fast)["reason"].startswith("modulator_time_constant_s is below step_s")
+    assert fly_one(**fast, step_s=0.1)["pulse_count"] == pytest.approx(1448, abs=2)
+    assert fly_one(**fast | {"control": "clipped"})["status"] == "ok"
