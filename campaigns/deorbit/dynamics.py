@@ -52,13 +52,14 @@ def osculating(r, v):
     """(a [m], e, omega [rad]) of the orbit through an inertial position [m] and velocity [m/s].
 
     omega from the eccentricity vector's components along and across the node, by atan2: near-circular orbits
-    keep all digits.  Curtis, Orbital Mechanics for Engineering Students, 3rd ed., algorithm 4.2.
+    keep all digits.  Curtis, Orbital Mechanics for Engineering Students, 3rd ed., algorithm 4.2.  An orbit in the
+    equator has its node on x, as the desired path has.
     """
     w, u = dot(v, v) * (1.0 / MU_EARTH), 1.0 / norm(r)
     h, e = cross(r, v), subtracted(scaled(w - u, r), scaled(dot(r, v) * (1.0 / MU_EARTH), v))
-    # node vector (-hy, hx, 0); across it in the orbital plane lies h x node
-    along = h.x * e.y - h.y * e.x
-    across = h.z * (-h.x * e.x - h.y * e.y) + (h.x * h.x + h.y * h.y) * e.z  # times h
+    nx, ny = where((h.x == 0.0) & (h.y == 0.0), 1.0, -h.y), h.x  # node vector; across it in the plane lies h x node
+    along = nx * e.x + ny * e.y
+    across = h.z * (nx * e.y - ny * e.x) + (h.x * ny - h.y * nx) * e.z  # times h
     return Elements(a=1.0 / (2.0 * u - w), e=norm(e), omega=atan2(across, along * norm(h)))
 
 

@@ -167,3 +167,9 @@ def test_near_a_circle_the_argument_of_perigee_keeps_its_digits():
     _, e, omega = osculating(*(Vector(*components) for components in place(elements)))
     assert e == pytest.approx(1e-6, abs=1e-15)
     assert omega == pytest.approx(1.2, abs=1e-9)
+
+
+def test_a_flight_in_the_equator_has_the_elements_of_an_inclined_one():
+    inclined, equatorial = fly_one(**DEMONSTRATION), fly_one(**DEMONSTRATION, inclination_deg=0.0)
+    for column in ("actual_perigee_argument_deg", "overshoot_omega_pct", "settling_time_s"):
+        assert equatorial[column] == pytest.approx(inclined[column], rel=1e-9), column
