@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from campaigns.geo_servicing import corrections, dynamics, navigation, outcome, plan_table
-from campaigns.geo_servicing.dynamics import MU, R0, State
+from campaigns.geo_servicing.dynamics import MU, R0, SIDEREAL_DAY, State
 from campaigns.geo_servicing.inputs import BURN_NUMBERS, CHOICES, Inputs
 from campaigns.geo_servicing.phasing_plan import plan_of
 from mc_engine.errors import ModelError
@@ -100,8 +100,19 @@ Parameters = prepared(prepare, Inputs)
 
 
 def tables(o: Any) -> np.ndarray:
-    """The phasing plan and the harmonics of the geopotential, for the settings o."""
-    plan = kept_design(plan_of, *nominal_start(o)) if o.phase == CHOICES.phase.phasing else np.zeros(plan_table.LENGTH)
+    """The phasing plan and the harmonics of the geopotential, SI, for the settings o.
+
+    Raises ModelError where the flight ends before the day after a designed transfer is over: metrics would be missing.
+    """
+    plan = np.zeros(plan_table.LENGTH)
+    if o.phase == CHOICES.phase.phasing:
+        plan = kept_design(plan_of, *nominal_start(o))
+        needed = (plan_table.end_of(plan, o.mass / o.thrust) + SIDEREAL_DAY) / _DAY
+        if o.schedule == CHOICES.schedule.designed and o.duration < needed * _DAY:
+            raise ModelError(
+                f"the designed transfer and the day after it take {needed:.2f} days: give duration_days "
+                f"{np.ceil(10.0 * needed + 1.0) / 10.0:.1f} or more, or a shorter longest_transfer_days"
+            )
     return np.append(plan, geopotential.harmonics_table(int(o.gravity_degree), int(o.gravity_order)))
 
 

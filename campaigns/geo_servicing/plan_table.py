@@ -30,3 +30,9 @@ def plan_rows(rows: Row) -> np.ndarray:
     """The table of a plan, of all its corrections in one Row of float64[n]."""
     written = np.append(len(rows.dv), np.column_stack(rows).ravel())
     return np.pad(written, (0, LENGTH - len(written)))
+
+
+def end_of(plan: np.ndarray, mass_per_thrust: float) -> float:
+    """End of the last burn [s], a little late: for the mass at the start; mass_per_thrust : [kg/N]."""
+    last = 1 + _WIDTH * (int(plan[0]) - 1)
+    return float(plan[last] + mass_per_thrust * abs(plan[last + 1]))

@@ -238,3 +238,11 @@ def test_the_plan_keeps_its_limits_on_coasts_time_and_last_burn(first, least, lo
 def test_two_corrections_cannot_keep_all_limits_and_that_is_said():
     with pytest.raises(ModelError, match="no phasing plan"):
         fly_one(**PERFECT, planned_corrections=2.0)
+
+
+def test_a_flight_that_ends_before_the_day_after_a_designed_transfer_is_refused():
+    """Its metrics would be missing: the transfer takes 2.07 days, and the place is that of the day after."""
+    with pytest.raises(ModelError, match=r"take 3\.07 days: give duration_days 3\.2 or more"):
+        fly_one(**PERFECT, duration_days=3.0)
+    row = fly_one(**PERFECT, duration_days=3.2)
+    assert abs(row["daily_mean_longitude_deviation_deg"]) < 1e-3
