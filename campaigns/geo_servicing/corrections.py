@@ -65,7 +65,10 @@ class Memory(NamedTuple):
 def start(o):
     """Before the first sample: what is due first, and when [s]."""
     if o.phase == CHOICES.phase.inspection:
-        return Memory(due=maximum(o.observation, FIRST_LOOK), mode=DECISION)
+        # settled from the start where no time is given to settle: an event at the start does not rise
+        return Memory(
+            due=maximum(o.observation, FIRST_LOOK), mode=DECISION, settled=where(o.settle_time > 0.0, 0.0, 1.0)
+        )
     if o.phase == CHOICES.phase.phasing:
         return Memory(due=planned(o.tables, 0.0).ignition, mode=IGNITION)
     return Memory()

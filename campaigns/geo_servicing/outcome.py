@@ -69,8 +69,8 @@ Metrics = metrics(
     final_eccentricity=at_end("eccentricity", "osculating eccentricity at the end of the flight", low=0.0, unit=""),
     min_range_m=_some("smallest range", low=0.0),
     max_range_m=_some("largest range", low=0.0),
-    settled_min_range_m=_some("smallest range after settle_time_days", low=0.0),
-    settled_max_range_m=_some("largest range after settle_time_days", low=0.0),
+    settled_min_range_m=_some("smallest range after settle_time_days; no number if the flight ends before", low=0.0),
+    settled_max_range_m=_some("largest range after settle_time_days; no number if the flight ends before", low=0.0),
     relative_eccentricity=_some("length of the difference of the eccentricity vectors at the end", low=0.0, unit=""),
     relative_drift_m=_some("drift of the module past the target in a revolution, at the end"),
     steady=_some("1 if the settled range stayed within range_low_m and range_high_m", low=0.0, high=1.0, unit=""),
@@ -135,8 +135,9 @@ def evaluate(t, s, m, p, o, best):
     if o.phase != CHOICES.phase.phasing:  # no transfer: where the module is at the end of the flight
         end = replace(ended(t, s, p), transfer_time=NONE)
     if o.phase == CHOICES.phase.inspection:
-        near, far, true = -best.settled_near, best.settled_far, relative_orbit(s, EXACT)
-        steady = where((m.settled > 0.5) & (near >= o.range_low) & (far <= o.range_high), 1.0, 0.0)
+        settled, true = m.settled > 0.5, relative_orbit(s, EXACT)
+        near, far = where(settled, -best.settled_near, NONE), where(settled, best.settled_far, NONE)
+        steady = where(settled & (near >= o.range_low) & (far <= o.range_high), 1.0, 0.0)
         inspected = Inspected(best.near, best.far, near, far, true.drift, true.e, steady)
     period, actual = period_error(end.drift_rate), period_error(end.actual_drift_rate)
     return merged(Metrics, end, inspected, period_error=period, actual_period_error=actual)

@@ -196,6 +196,19 @@ def test_fixes_of_both_craft_err_as_one_relative_fix_of_their_root_sum_square():
     assert row["delta_v_m_s"] != fly_one(**INSPECTION | {"navigation": "raw"} | both)["delta_v_m_s"]
 
 
+def test_a_flight_that_ends_before_it_counts_as_settled_has_no_settled_range():
+    """A range of none would meet every limit."""
+    row = fly_one(**INSPECTION | {"duration_days": 1.0, "settle_time_days": 2.0})
+    assert np.isnan([row["settled_min_range_m"], row["settled_max_range_m"]]).all()
+    assert row["steady"] == 0.0
+
+
+def test_without_a_time_to_settle_the_settled_range_is_that_of_the_flight():
+    row = fly_one(**INSPECTION | {"duration_days": 1.0, "settle_time_days": 0.0})
+    assert row["settled_min_range_m"] == row["min_range_m"]
+    assert row["settled_max_range_m"] == row["max_range_m"]
+
+
 def test_the_printed_errors_are_enough_for_a_filter():
     row = fly_cases(**INSPECTION | EXECUTION | FILTERED, chi1=np.full(100, 0.85))
     assert held(row).mean() >= 0.99
