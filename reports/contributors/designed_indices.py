@@ -11,7 +11,7 @@ from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.run.contributions import Contributor
 from reports.run.flown import Flown
 from reports.run.outcomes import ALL_LIMITS, inside, inside_words
-from reports.text.numbers import axis_label, count, given_percent, number
+from reports.text.numbers import axis_label, count, counted, given_percent, number
 
 MOST_METRICS = 8
 MOST_INPUTS = 12  # of a metric in the table
@@ -46,7 +46,17 @@ def designed_blocks(flown: Flown, inputs: Mapping[str, Any]) -> Iterator[FigureB
             f"No indices for {', '.join(silent)}: the same in all cases that have it, or fewer than {FEWEST_BLOCKS} "
             f"whole {BLOCKS[flown.design]} with a number."
         )
+    yield from further_metrics(flown, "in report.json" if flown.design == "saltelli" else "")
     yield "Fractions of the cases of this design estimate no probabilities: its cases are not independent random draws."
+
+
+def further_metrics(flown: Flown, elsewhere: str = "") -> Iterator[str]:
+    """A sentence on the metrics that tables and figures of contributors leave out; `elsewhere` says where they are."""
+    key = flown.key_metrics[:MOST_METRICS]
+    others = sum(name not in key and not summary.constant for name, summary in flown.summaries.items())
+    if others:
+        where = elsewhere or "not shown; metrics with a requirement or in a figure come first"
+        yield f"The effects on {counted(others, 'other metric')} are {where}."
 
 
 def _index_figure(flown: Flown, indices: DesignedIndices, shown: np.ndarray, names: Mapping[str, str]) -> FigureBlock:

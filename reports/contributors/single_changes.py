@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reports.contributors.designed_indices import MOST_INPUTS, MOST_METRICS
+from reports.contributors.designed_indices import MOST_INPUTS, MOST_METRICS, further_metrics
 from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.drawing.marks import Drawing, Plot
 from reports.figures.rows import single_change_panel
@@ -67,6 +67,7 @@ def single_change_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
             f"Changes of {flown.listed(unknown)} are not known: there is no number where all inputs are nominal, or "
             "none where one is not."
         )
+    yield from further_metrics(flown)
 
 
 @dataclass(frozen=True)

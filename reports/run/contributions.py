@@ -112,13 +112,14 @@ class Contributions:
 
 
 def contributions(flown: "Flown") -> Contributions | None:
-    """Contributions to every metric by a companion, or to those that matter by a random table; None without either."""
+    """Contributions to every metric by a companion or by Saltelli's blocks, or to those that matter by a random table;
+    None without any."""
     store, metrics = companion_of(flown), flown.key_metrics[:MOST_METRICS]
+    every = list(dict.fromkeys([*metrics, *(fact.name for fact in flown.with_role("metric"))]))
     if store is not None:
-        every = [fact.name for fact in flown.with_role("metric")]
-        return _of_companion(flown, store, list(dict.fromkeys([*metrics, *every])))
+        return _of_companion(flown, store, every)
     if flown.design == "saltelli":
-        return _of_blocks(flown, metrics)
+        return _of_blocks(flown, every)
     return _of_table(flown, metrics) if flown.random and flown.n_held >= FEWEST_CASES else None
 
 

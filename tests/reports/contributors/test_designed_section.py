@@ -65,6 +65,15 @@ def test_the_indices_of_saltelli_are_data_too():
     assert strongest.total_interval[1] - strongest.total == pytest.approx(half, rel=0.1)
 
 
+def test_metrics_that_have_no_row_are_counted_and_those_of_saltelli_are_data():
+    """Without a requirement or a figure a metric was left out, without a word, of the report and of its data."""
+    told = {design: section(designed(design))[-2].paragraphs[0] for design in ("saltelli", "morris")}
+    assert told["saltelli"] == "The effects on 4 other metrics are in report.json."
+    assert told["morris"].startswith("The effects on 4 other metrics are not shown;")
+    flown = Flown(designed("saltelli"), "run")
+    assert {one.metric for one in run_data(flown)["contributors"]} == {*flown.summaries}
+
+
 def test_cases_of_a_block_at_one_place_count_once_in_a_map():
     """They differ in other inputs one by one; as independent cases they gave a map of their noise."""
     run = designed("saltelli")
@@ -93,9 +102,12 @@ def test_one_at_a_time_tells_what_each_input_does_alone():
         for metric in ("entry_speed_m_s", "pulse_count")
     ]
     run.table["pulse_count"] = 4.0
-    figure, table, same = section(run)
+    figure, table, same, others = section(run)
     assert isinstance(figure, FigureBlock)
     assert same.paragraphs == ("No input alone changes pulse count, in the cases that have it.",)
+    assert others.paragraphs[0].endswith(
+        "other metrics are not shown; metrics with a requirement or in a figure come first."
+    )
     rows = [row for row in table.rows if row[0].text == "entry speed [m/s]"]
     said = [tuple((cell.text, cell.small.replace("\u202f", " ")) for cell in row[1:]) for row in rows]
     assert said == [
@@ -107,7 +119,7 @@ def test_one_at_a_time_tells_what_each_input_does_alone():
 def test_one_at_a_time_without_a_nominal_number_has_no_changes():
     run = one_at_a_time()
     run.table.loc[0, "status"] = "not-finite"
-    (words,) = section(run)
+    words, *_ = section(run)
     assert words.paragraphs[0].startswith("Changes of propellant, ")
 
 
@@ -119,4 +131,4 @@ def test_an_input_without_a_number_keeps_its_row_and_rounding_is_no_change():
     (table,) = [block for block in blocks if isinstance(block, Table)]
     (row,) = [row for row in table.rows if row[0].text == "peak force [N]" and row[1].text == "oe"]
     assert [cell.text for cell in row[2:]] == ["–", "–", "0/2"]
-    assert "No input alone changes propellant" in blocks[-1].paragraphs[0]
+    assert "No input alone changes propellant" in blocks[-2].paragraphs[0]
