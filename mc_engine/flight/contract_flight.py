@@ -69,11 +69,15 @@ def faults(campaign: Campaign) -> list[str]:
         with _completed_within(_BLOCKS * LONGEST_S, f"the first {ids.size} cases have", campaign):
             flown = results(campaign, inputs, ids)
         lost = _too_long(campaign, nominal) or not_finite(campaign, inputs, ids, flown, nominal)
-        faults_of_flight = [*(lost or _none_completing(campaign, flown)), *other_bits(campaign, inputs, ids, flown)]
+        faults_of_flight = [
+            *(lost or _none_completing(campaign, flown, nominal)),
+            *other_bits(campaign, inputs, ids, flown),
+        ]
         return faults_of_flight or [
             *_past_until(campaign, nominal),
             *_never_set(campaign, flown),
             *_always_the_same(campaign, flown),
+            *_never_above(campaign, flown),
             *_moving_nothing(campaign, inputs, ids),
             *events_that_never_happen(campaign, inputs, ids, nominal),
         ]
@@ -170,25 +174,32 @@ def _past_until(campaign: Campaign, nominal: Columns) -> Iterator[str]:
         )
 
 
-def _none_completing(campaign: Campaign, flown: Columns) -> Iterator[str]:
-    """One sentence if no case at all reached its end."""
+def _none_completing(campaign: Campaign, flown: Columns, nominal: Columns) -> Iterator[str]:
+    """One sentence if no case at all reached its end, or the nominal one did not."""
     status = flown["status"]
     if (status == STATUS_NAME[OK]).any():
+        if nominal["status"][0] != STATUS_NAME[OK]:
+            why = _why(campaign, nominal, 0, "it")
+            yield f"the nominal case does not complete: it is {nominal['status'][0]} ({why})"
         return
     words, counts = np.unique(status.astype(str), return_counts=True)
     word = str(words[counts.argmax()])
-    text = {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()}[word]
-    sentence = f"none of the first {status.size} cases completes: {counts.max()} are {word}"
-    first = int(np.flatnonzero(status == word)[0])
-    where = [str(flown["reason"][first])]  # with phases, that of the end
+    why = _why(campaign, flown, int(np.flatnonzero(status == word)[0]), "the first of them")
+    yield f"none of the first {status.size} cases completes: {counts.max()} are {word} ({why})"
+
+
+def _why(campaign: Campaign, flown: Columns, row: int, who: str) -> str:
+    """Why the case in a row failed, and where it ended."""
+    word, reason = str(flown["status"][row]), str(flown["reason"][row])  # with phases, the reason tells that of the end
     if word == "refused":
-        text, where = where[0], []
-    elif word == "no-stop":
-        text = why_no_stop(campaign)
+        return reason
+    if word == "no-stop":
+        text, where = why_no_stop(campaign), [reason]
     else:
-        where = [f"at t = {flown[END_TIME][first]:.6g} s", *where]
+        text = {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()}[word]
+        where = [f"at t = {flown[END_TIME][row]:.6g} s", reason]
     ends = " ".join(filter(None, where))
-    yield f"{sentence} ({text}{f'; the first of them ends {ends}' if ends else ''})"
+    return f"{text}{f'; {who} ends {ends}' if ends else ''}"
 
 
 def _never_set(campaign: Campaign, flown: Columns) -> Iterator[str]:
@@ -220,6 +231,24 @@ def _always_the_same(campaign: Campaign, flown: Columns) -> Iterator[str]:
             yield (
                 f'the metric "{metric.name}" is {value:g} whatever happens; let `evaluate` work it out, leave it out, '
                 "or declare it with sometimes=True if it differs only with some settings"
+            )
+
+
+def _never_above(campaign: Campaign, flown: Columns) -> Iterator[str]:
+    """Last times above a level that no case exceeds, of outputs whose unit is not that of SI, as the level's is."""
+    ok = flown["status"] == STATUS_NAME[OK]
+    model = compiled_model(campaign.model)
+    extrema = {extremum.name: extremum for extremum in model.extrema if extremum.kind == "last_above"}
+    for metric in model.metrics:
+        if metric.symbol not in extrema or metric.sometimes or flown[metric.name][ok].any():
+            continue
+        level, output = extrema[metric.symbol].level, extrema[metric.symbol].quantity
+        unit, factor = next((q.unit, q.si_factor) for q in model.quantities if q.name == output)
+        if factor != 1.0:
+            yield (
+                f'the metric "{metric.name}" is 0 in all of the {ok.sum()} cases that flew: none has "{output}" above '
+                f"the level of {level / factor:.6g} {unit}; `level` is in SI, so that {unit} are multiplied by "
+                f"{factor:.6g}; or declare the metric with sometimes=True if it differs only with some settings"
             )
 
 

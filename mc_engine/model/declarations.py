@@ -12,7 +12,7 @@ from typing import Any
 
 from mc_engine.errors import ModelError
 from mc_engine.lanes.physics_function import PhysicsFunction
-from mc_engine.model.fields import OF_NAME, Extremum, Field, Named, Parameter, Setting
+from mc_engine.model.fields import OF_NAME, Extremum, Field, Named, Parameter, Setting, refuse_other_types
 from mc_engine.units import UNITS, unit_hint, unit_of
 
 _RECORDS = {"states": "State", "outputs": "Outputs", "metrics": "Metrics", "events": "EVENTS", "extrema": "EXTREMA"}
@@ -123,13 +123,14 @@ def last_above(output: str, level: float, description: str = "", **options: Any)
     the end if it is still above then, so choose the limit of a requirement below the end of the flight.
 
     output, description, options : as of `maximum_of`
-    level : float, in SI
+    level : float, in SI and radians, whatever the unit of the output: 0.01 of an output in degrees is 0.57 deg
 
     Returns the Metric.
     Raises TypeError for another argument.
 
-    >>> last_above("error_deg", 0.01, "settling time").extremum.level
-    0.01
+    >>> from math import radians
+    >>> last_above("error_deg", radians(0.5), "last time above 0.5 deg").extremum.level
+    0.008726646259971648
     """
     return Metric("time", _column(description, options), Extremum("", output, "last_above", level))
 
@@ -193,7 +194,7 @@ def inputs(**declared: Parameter | Setting) -> Any:
 
     Returns the named tuple of the parameters.
 
-    Raises ModelError for a name without its unit.
+    Raises ModelError for a name without its unit, or for a value of another type, such as a text in place of a number.
 
     >>> inputs(altitude_km=Parameter(300.0, "altitude of the orbit"))._fields
     ('altitude',)
@@ -204,6 +205,8 @@ def inputs(**declared: Parameter | Setting) -> Any:
                 f'the input "{name}" is {item!r}; it must be Parameter(default, "meaning") or Setting(...)'
             )
     named = [_with_unit(item, name) for name, item in declared.items()]
+    for item in named:
+        refuse_other_types(item, f'{type(item).__name__} "{item.name}"')
     return _record("Inputs", [item.symbol for item in named if isinstance(item, Parameter)], tuple(named))
 
 

@@ -108,6 +108,22 @@ def test_metrics_that_are_never_set_infinite_or_constant_are_named_one_by_one(tm
     assert idle.startswith('the metric "idle_m_s" is 7.5 whatever happens; let `evaluate` work it out')
 
 
+@pytest.mark.parametrize(("options", "found"), [("", 1), (", sometimes=True", 0)])
+def test_a_level_that_no_output_exceeds_is_told_in_the_unit_of_the_output(options, found, tmp_path):
+    metric = 'top_speed_m_s=maximum_of("speed_m_s", "largest speed")'
+    campaign = campaign_with(
+        tmp_path,
+        (metric, f'{metric}, high_s=last_above("altitude_km", 1e9, "last time above"{options})'),
+        ("inputs, maximum_of", "inputs, last_above, maximum_of"),
+    )
+    told = faults(campaign)
+    assert len(told) == found
+    sentence = (
+        'the metric "high_s" is 0 in all of the 32 cases that flew: none has "altitude_km" above the level of 1e+06'
+    )
+    assert all(one.startswith(f"{sentence} km; `level` is in SI") for one in told)
+
+
 CLOCK = "FixedStep(step=10.0, until=10_000.0)"
 STOP = 'events={"apogee": Event(climb, "falling", "stop")}'
 
@@ -217,7 +233,7 @@ def test_the_end_of_a_phase_that_looks_for_an_event_carries_it_over_nothing():
 def test_where_no_case_can_start_the_sentence_has_the_reason_of_one_that_cannot():
     reasons = np.array(['in the phase "coast"', "too low", "too low"], dtype=object)
     flown = {"status": np.array(["no-stop", "refused", "refused"]), "reason": reasons}
-    assert only([*_none_completing(None, flown)]).endswith("2 are refused (too low)")
+    assert only([*_none_completing(None, flown, flown)]).endswith("2 are refused (too low)")
 
 
 def test_where_no_case_completes_the_sentence_says_when_the_first_ends(tmp_path):
@@ -225,6 +241,16 @@ def test_where_no_case_completes_the_sentence_says_when_the_first_ends(tmp_path)
     edits = [("import Event, FixedStep", "import AdaptiveStep, Event"), (CLOCK, clock)]
     sentence = only(faults(campaign_with(tmp_path, *edits)))
     assert re.search(r"32 are step-limit \(the cap .* reached; the first of them ends at t = \d+\.?\d* s\)$", sentence)
+
+
+def test_a_nominal_case_that_does_not_complete_among_cases_that_do_is_told(tmp_path):
+    edits = [
+        ("def climb(s)", "def climb(s, p)"),
+        (CLIMB, f"return {CLIMB.removeprefix('return ')} + where(p.pitch_error == 0.0, 1e20, 0.0)"),
+        ("import cos, physics, sin, sqrt", "import cos, physics, sin, sqrt, where"),
+    ]
+    sentence = only(faults(campaign_with(tmp_path, *edits)))
+    assert sentence.startswith("the nominal case does not complete: it is no-stop (")
 
 
 CLIMB = "return s.x * s.vx + s.y * s.vy"

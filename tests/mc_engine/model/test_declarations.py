@@ -309,3 +309,9 @@ def test_events_may_share_a_function_that_gives_one_number(tmp_path):
     both = ('"falling", "stop")}', '"falling", "stop"), "rise": Event(climb, "rising", "stop", rare=True)}')
     plain, shared = flown(tmp_path / "plain"), flown(tmp_path / "both", both)
     assert all(np.array_equal(plain[name], shared[name]) for name in plain)
+
+
+def test_an_input_of_another_type_is_told_where_it_is_declared(tmp_path):
+    """Behind it `prepared` computes with the value, and told a TypeError of Python."""
+    sentence = "Parameter \"altitude_km\" has '300' as its `default`; it must be a number"
+    refused(tmp_path, [("300.0,", '"300",')], sentence, "Inputs = inputs(")

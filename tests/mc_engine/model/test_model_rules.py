@@ -60,7 +60,6 @@ CONTRADICTIONS = {
                             '"altitude_km"'),
     "default of nobody": (*with_input('law=Setting("c", "law", choices=("a", "b"))'),
                           'setting "law" has the default \'c\'; known are "a", "b"'),
-    "a text as a default": (("300.0,", '"300",'), "\"altitude_km\" has '300' as its `default`; it must"),
     "sampling between steps": ((CLOCK, "FixedStep(step=1.0, until=5.0, control_every=1.5)"), "it counts steps, in"),
     "number as a text": (('"largest speed"', "3"), '"top_speed_m_s" has 3 as its `description`; it must be a text'),
     "number as the source": (given("source=3"), "the model has 3 as its `source`; it must be a text"),
