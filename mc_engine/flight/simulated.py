@@ -133,7 +133,8 @@ class SimulatorFlyer(Flyer):
         table = {} if self._campaign.first is not None else case_table(self._campaign, ids)
         nominal = np.array([NOMINAL_NOISE])
         alone = {name: np.array([value]) for name, value in self._campaign.nominal.items()}
-        flight = _Flight(self, alone, nominal, None, never)
+        histories: list[Columns] = []
+        flight = _Flight(self, alone, nominal, None, never, on_history=histories.append)
         flight.fly()  # starts the process
         begin = time.perf_counter()
         twice = [(self._flown(nominal, {})[0], self._flown(ids, table)[0]) for _ in range(2)]
@@ -156,6 +157,8 @@ class SimulatorFlyer(Flyer):
             lines.append(f"case 0 ends as {dispersed['status']}: {dispersed['reason']}")
         if flight.left_out:
             lines.append(f"not saved, as no declared outputs: the columns {', '.join(flight.left_out)} of the history")
+        if self.simulator.outputs and not any(histories):
+            lines.append("no time histories are saved, because the nominal case gives none of its declared outputs")
         asked = self._campaign.retention
         if not self.simulator.outputs and (asked.first or asked.cases or asked.worst_of):
             lines.append("no time histories are saved, because the simulator declares no outputs")
