@@ -3,6 +3,7 @@
 A mistake in one section does not hide those in others: each table is validated separately (pydantic).
 """
 
+import ast
 import json
 import re
 import tomllib
@@ -125,6 +126,12 @@ class TuningSections:
     objective_names: tuple[str, ...]
 
 
+_TOML_FIXES = {  # by what `tomllib` says
+    "Invalid value": "; a text stands in quotes, a truth value is true or false, a number begins with a sign or digit",
+    "Cannot overwrite a value": "; a name stands once in its section",
+}
+
+
 def parse_toml(text: str, source: str) -> dict[str, Any]:
     """The text as a document; CampaignError with line and column where it is not TOML."""
     if match := _LONG_KEY.search(text):
@@ -135,9 +142,16 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         match = re.fullmatch(r"(.*) \(at (line \d+, column \d+|end of document)\)", str(error), re.DOTALL)
         message, place = match.groups() if match else (str(error), "")
-        raise CampaignError(source, [Problem(place, f"this is not TOML: {_lower_first(message)}")]) from None
+        raise CampaignError(source, [Problem(place, f"this is not TOML: {_in_words_of_toml(message)}")]) from None
     except (ValueError, RecursionError) as error:
         raise CampaignError(source, [Problem("", f"this is not TOML that can be read: {error}")]) from None
+
+
+def _in_words_of_toml(message: str) -> str:
+    """What `tomllib` says, with the names of tables as they are written, and with the usual fix."""
+    if match := re.fullmatch(r"Cannot declare (\(.*\)) twice", message, re.DOTALL):
+        message = f"Cannot declare [{'.'.join(ast.literal_eval(match[1]))}] twice"
+    return _lower_first(message) + _TOML_FIXES.get(message, "")
 
 
 def read_sections(document: dict[str, Any], findings: Findings) -> Sections:

@@ -24,7 +24,7 @@ from mc_engine.errors import EngineError
 from mc_engine.flight.compiled import CompiledFlyer
 from mc_engine.flight.flyer import NOMINAL_NOISE
 from mc_engine.flight.kernel import clock_number, finer, grid_of
-from mc_engine.flight.lost_numbers import not_finite
+from mc_engine.flight.lost_numbers import first_lost, may_be_lost, not_finite
 from mc_engine.flight.missing_events import events_that_never_happen, why_no_stop
 from mc_engine.flight.repeatability import (
     Columns,
@@ -75,7 +75,7 @@ def faults(campaign: Campaign) -> list[str]:
         ]
         return faults_of_flight or [
             *_past_until(campaign, nominal),
-            *_never_set(campaign, flown),
+            *_never_set(campaign, flown, nominal),
             *_always_the_same(campaign, flown),
             *_never_above(campaign, flown),
             *_moving_nothing(campaign, inputs, ids),
@@ -202,18 +202,23 @@ def _why(campaign: Campaign, flown: Columns, row: int, who: str) -> str:
     return f"{text}{f'; {who} ends {ends}' if ends else ''}"
 
 
-def _never_set(campaign: Campaign, flown: Columns) -> Iterator[str]:
-    """Metrics without a finite number in any case that flew."""
+def _never_set(campaign: Campaign, flown: Columns, nominal: Columns) -> Iterator[str]:
+    """Metrics without a finite number in any case that flew, and the line that makes the first of them not a number."""
     ok = flown["status"] == STATUS_NAME[OK]
-    for metric in compiled_model(campaign.model).metrics:
+    model, lost = compiled_model(campaign.model), False
+    for metric in model.metrics:
         values = flown[metric.name][ok]
         if not metric.sometimes and not np.isfinite(values).any():
+            lost = True
             word = "infinite in all" if np.isinf(values).any() else "not a number in any"
             yield (
                 f'the metric "{metric.name}" is {word} of the {values.size} cases that flew; look at `evaluate`, or at '
                 "the output or the event that it is declared by, or declare it with sometimes=True if it exists only "
                 "with some settings"
             )
+    if lost and may_be_lost(model, nominal):
+        sentence = first_lost(model, campaign.nominal, NOMINAL_NOISE, campaign.seed, "the nominal case")
+        yield from filter(None, [sentence])
 
 
 def _always_the_same(campaign: Campaign, flown: Columns) -> Iterator[str]:

@@ -185,7 +185,7 @@ def _refuse_clock(clock: FixedStep | AdaptiveStep, settings: list[str], states: 
         if clock.rates or uses_rates(clock):
             _refuse_rates(clock, states)
         return
-    _refuse_time("rtol", clock.rtol, settings)
+    _refuse_time("rtol", clock.rtol, settings, most=1.0)  # a fraction of the state
     if not callable(clock.control_period):
         _refuse_time("control_period", clock.control_period, settings, most=inf)
     _refuse_time("attempts", clock.attempts, [], least=1.0, most=_MOST_ATTEMPTS)

@@ -93,6 +93,19 @@ def test_broken_toml_is_reported_with_line_and_column():
         assert caught.value.problems[0].place == place
 
 
+def test_usual_mistakes_in_toml_are_told_with_their_fix():
+    for text, message in [
+        ("[campaign]\ndesign = mc\n", "invalid value; a text stands in quotes, a truth value is true or false"),
+        ("[campaign]\nseed = 1\nseed = 2\n[x]", "cannot overwrite a value; a name stands once in its section"),
+        ("[dispersion.mass_kg]\n[dispersion.mass_kg]\n", "cannot declare [dispersion.mass_kg] twice"),
+        ("[report]\n[report]\n", "cannot declare [report] twice"),
+        ("[a.\"('b')\"]\n[a.\"('b')\"]\n", "cannot declare [a.('b')] twice"),
+    ]:
+        with pytest.raises(CampaignError) as caught:
+            parse_toml(text, "x.toml")
+        assert caught.value.problems[0].message.startswith(f"this is not TOML: {message}")
+
+
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),

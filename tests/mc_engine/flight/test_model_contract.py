@@ -102,7 +102,10 @@ def test_metrics_that_are_never_set_infinite_or_constant_are_named_one_by_one(tm
         given("evaluate=evaluate"),
     )
     assert breaches(campaign) == []
-    lost, endless, idle = faults(campaign)
+    lost, endless, line, idle = faults(campaign)
+    division = "return Metrics(lost=best.top_speed / 0.0 * 0.0, endless=best.top_speed / 0.0, idle=7.5)"
+    assert line.startswith(f'"lost_m_s": model.py, line {line_of(tmp_path, division)}: `')
+    assert line.endswith(": 7825.76 / 0 is infinite (t = 2825.28 s, the nominal case)")
     assert lost.startswith('the metric "lost_m_s" is not a number in any of the 32 cases')
     assert endless.startswith('the metric "endless_m_s" is infinite in all of the 32 cases that flew')
     assert idle.startswith('the metric "idle_m_s" is 7.5 whatever happens; let `evaluate` work it out')

@@ -214,3 +214,12 @@ def test_a_table_without_a_number_is_not_blamed_on_the_model(tmp_path, flown):
     flown.cases().assign(**dict.fromkeys(metrics, np.nan)).to_csv(tmp_path / "results.csv", index=False)
     words = ["import", tmp_path / "results.csv", "--campaign", campaign, "--out", tmp_path / "run", "--no-report"]
     assert "no case completed; the column `reason` of its cases says why" in told(*words)
+
+
+def test_check_tells_of_declared_outputs_of_which_no_history_comes(tmp_path):
+    fault = "return {'fall_time_s': 1.0, 'impact_speed_m_s': 1.0}"
+    told = "no time histories are saved, because the nominal case gives none of its declared outputs"
+    for folder, lines, expected in (("none", fault, True), ("some", "", False)):
+        said = CliRunner().invoke(app, ["check", str(python_campaign(tmp_path / folder, cases=1, fault=lines))])
+        assert said.exit_code == 0
+        assert (told in said.stdout) == expected

@@ -60,6 +60,8 @@ CONTRADICTIONS = {
                             '"altitude_km"'),
     "default of nobody": (*with_input('law=Setting("c", "law", choices=("a", "b"))'),
                           'setting "law" has the default \'c\'; known are "a", "b"'),
+    "tolerance": ((CLOCK, "AdaptiveStep(until=5.0, rtol=1e9)"), ("FixedStep,", "AdaptiveStep,"),
+                  "the clock's `rtol` is 1000000000.0; it must be a number above 0, and 1 at most"),
     "sampling between steps": ((CLOCK, "FixedStep(step=1.0, until=5.0, control_every=1.5)"), "it counts steps, in"),
     "number as a text": (('"largest speed"', "3"), '"top_speed_m_s" has 3 as its `description`; it must be a text'),
     "number as the source": (given("source=3"), "the model has 3 as its `source`; it must be a text"),
