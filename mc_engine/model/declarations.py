@@ -157,7 +157,7 @@ def value_at(event: str, output: str, description: str = "", **options: Any) -> 
 
     event : str, the name of an event
     output : str, the name of an output; for the time use `time_of`
-    description : str, one line; by default made from the descriptions of the output and the event
+    description : str, one line; by default made from the output's description and the event's name
     options : low, high, sometimes, unit; see `Field`
 
     Returns the Metric, for `metrics`.
@@ -218,7 +218,7 @@ def choices(inputs: Any) -> SimpleNamespace:
     Returns an attribute for each setting with choices, by its name without unit; the words are its attributes.  For a
     word that is not a Python name, assign getattr(CHOICES.law, "two-body") to a name outside the physics.
 
-    Raises AttributeError for an argument that `inputs` has not made.
+    Raises AttributeError for an argument without declarations.
 
     >>> Inputs = inputs(law=Setting("a", "control law", choices=("a", "b")))
     >>> choices(Inputs).law.b

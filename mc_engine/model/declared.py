@@ -197,7 +197,10 @@ def prepared(prepare: Callable[..., Any], inputs: Any) -> Any:
 
 
 def _phases(phases: Any, **others: Any) -> Mapping[str, Phase]:
-    """The phases, empty for a model without any; ModelError if it also declares something that belongs to a phase."""
+    """The phases by name; empty for a model with `rhs` in place of them.
+
+    ModelError for a model with neither, or with phases and something that each phase has of its own.
+    """
     if phases is None:
         if others["rhs"] is None:
             raise ModelError("the model has no `rhs`; write rhs(s), which gives the derivative of the state, or phases")

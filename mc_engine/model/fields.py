@@ -86,8 +86,7 @@ class Parameter(Named):
     low : float, smallest value that is accepted, in `unit`
     high : float, largest value that is accepted, in `unit`
     random_draw : bool, the value only selects a random draw, as a seed does; sensitivity counts it as a random draw
-    sometimes : bool, see `Field`
-    name, unit : see `Named`
+    sometimes, name, unit : see `Named`
 
     >>> altitude = Parameter(300.0, "altitude of the orbit", low=150.0, high=2000.0, name="altitude_km", unit="km")
     >>> altitude.default * altitude.si_factor
@@ -116,8 +115,7 @@ class Setting(Named):
     whole : bool, only whole numbers are accepted, as for a count
     date : bool, the value is a date as text, "2019-01-01T12:00:00"; physics sees the modified Julian date in UTC
     dispersed_by : str, name of the parameter, if there is one, by which a case deviates from the setting
-    sometimes : bool, see `Field`
-    name, unit : see `Named`; a choice, a switch and a date have no unit
+    sometimes, name, unit : see `Named`; a choice, a switch and a date have no unit
 
     >>> gravity = Setting("j2", "gravity model", choices=("point", "j2"), name="gravity", unit="")
     >>> gravity.code("j2")
@@ -246,7 +244,7 @@ class AdaptiveStep:
         `Event`
     rtol : float or str, error allowed in a step, as a fraction of the state's own size
     atol : float, or tuple with one for each state, error allowed in a step, in SI, in addition to rtol's.  It alone
-        counts where a state passes through zero: a needlessly small value, as 1e-9 m in an orbit, makes steps short.
+        counts where a state passes through zero: far too small a value, as 1e-9 m in an orbit, makes steps short there.
     control_period : float, str or function of the settings, time [s] between calls of `control`, which happen at whole
         multiples from t = 0, and only in phases with a control; steps end there.  Required by a model with `control`
     method : str, "dop853" (order 8) or "dp54" (order 5)

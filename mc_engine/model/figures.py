@@ -82,7 +82,7 @@ class FootprintFigure:
     ends_below : tuple (column, value) or None; a case whose column is above the value has not landed
     planet : str, the setting that names the planet; empty for the Earth
     target : tuple of two columns or parameters, latitude and longitude of the target; without it distances are
-        measured from the nominal impact point
+        measured from the end of the nominal case
 
     >>> FootprintFigure("end_latitude_deg", "end_longitude_deg", "Impact points").planet
     ''

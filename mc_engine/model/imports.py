@@ -20,7 +20,7 @@ _ENGINE = "mc_engine"
 
 
 class CapturedLoader(SourceFileLoader):
-    """Makes a module from the given content.  name : of the module from then on, independent of its import"""
+    """Makes a module from the given content.  name : of the module from then on, whatever name it is imported by"""
 
     def __init__(self, name: str, path: Path | str, content: bytes):
         super().__init__(name, str(path))

@@ -42,7 +42,7 @@ class NumberSection(Section):
     low: float | None = Key(default=None, description="smallest possible value; a smaller input is refused")
     high: float | None = Key(default=None, description="largest possible value; a larger input is refused")
     variable: str | None = Key(
-        default=None, min_length=1, description="variable of the FMU; default: the name of this table"
+        default=None, min_length=1, description="variable of the FMU; default: the name of the column"
     )
 
 
@@ -56,7 +56,7 @@ class MetricSection(NumberSection):
     """[simulator.metric]: a result, read by key, path or pattern, or taken from a variable of an FMU."""
 
     read: str | None = Key(
-        default=None, min_length=1, description="key or dotted path in the result; default: the name of this table"
+        default=None, min_length=1, description="key or dotted path in the result; default: the name of the metric"
     )
     pattern: str | None = Key(
         default=None, min_length=1, description="regular expression with one group, searched in stdout"
@@ -64,7 +64,9 @@ class MetricSection(NumberSection):
     take: Literal["final", "max", "min", "time_of_max", "crossing"] | None = Key(
         default=None, description="value taken of an FMU variable's history; default: final"
     )
-    level: float | None = Key(default=None, description="for a crossing: its level; the metric is the first time")
+    level: float | None = Key(
+        default=None, description="for a crossing: the level; the metric is the first time at this level"
+    )
     sometimes: bool = Key(default=False, description="the metric may be missing or NaN")
 
 

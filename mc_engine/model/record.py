@@ -67,7 +67,7 @@ class Model:
     prepare(inputs, settings, refusals) : dict of kernel parameters, see `model`
     start(p, o) : the first discrete state
     control(t, s, m, p, o, draws) : the next discrete state, at each sample, the first at t = 0
-    samples(t, s, m, p, o) : 1.0 in a phase with a control, 0.0 in one without; None if all phases are the same in that
+    samples(t, s, m, p, o) : 1.0 in a phase with a control, 0.0 in one without; None if all have one, or none has
     events(t, s, m, p, o) : named tuple with one component for each Event
     switch(t, s, m, p, o, hit) : (state, discrete state) after an event with the action "switch"; the field of hit is
         1.0 for an event that happened
@@ -171,7 +171,7 @@ class Refusals:
 
 
 def load_model(reference: str, beside: Path | None = None) -> Model:
-    """The `MODEL` of a module or of a file, such as a campaign names it.  Loading it runs the model's code.
+    """The `MODEL` of a module or of a file, as a campaign file names it.  Loading it runs the model's code.
 
     reference : str, a module ("campaigns.deorbit") or a file next to the campaign file ("model.py")
     beside : Path, the folder of the campaign file; the working folder by default
