@@ -25,9 +25,10 @@ def crest(v0, v1, v2, best):
 
 @physics
 def smooth_where_bent_alike(smooth, v0, v1, v2, v3, v4, t0, t1, t2, t3, t4):
-    """`smooth` where five values show no jump or corner, else 0: at most ALIKE times the curvature next to the middle.
+    """`smooth` where five values show no jump or corner, else 0.
 
-    A side is not tested if its two outer values are at the same time, or nearly so at the end.
+    The curvature at the middle value must be at most ALIKE times the curvature on either side of it.  A side is not
+    tested if its two outer values are at the same time, or nearly so at the end.
     """
     a, b, c, d = t1 - t0, t2 - t1, t3 - t2, t4 - t3
     before = ((v2 - v1) / b - (v1 - v0) / a) / (a + b)

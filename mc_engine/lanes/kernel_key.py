@@ -2,7 +2,7 @@
 
 numba compiles a function from its bytecode, and takes the values of global names, closures and default arguments as
 constants.  `kernel_key` follows the function objects of a model in the same way.  The digest does not depend on
-comments, docstrings, line numbers, descriptions, file names and folders, nor on numbers that reach a kernel as
+comments, docstrings, line numbers, descriptions, file names or folders, nor on numbers that reach a kernel as
 arguments: parameters, settings, tables, curves and the clock's times.  Functions of `mc_engine.lanes` are represented
 by the digest of its sources, functions of Python and NumPy by their versions.
 
