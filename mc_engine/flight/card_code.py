@@ -2,8 +2,8 @@
 
 The code is the kernel's LLVM IR, called by an entry that selects the case of the thread.  The entry takes a row of
 8-byte words: the number of cases, then one word for each number that the kernel takes, in its order; an array is its
-address and its shape.  A thread has the index of one case.  It adds this index to the addresses of the arrays that hold
-one number a case, so that the kernel sees arrays with one case.  Time histories are left out: their arrays are empty.
+address and its shape.  A thread has the index of one case.  In arrays that hold one number a case it advances the
+address to this index, so that the kernel sees arrays with one case.  Time histories are left out: their array is empty.
 
 The IR is optimised once, for the oldest cards.  The back end of llvmlite writes PTX from the result, without permission
 to contract operations.  It then writes each operation with its rounding, such as `mul.rn.f64`, and `fma.rn.f64` only

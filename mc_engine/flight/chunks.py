@@ -204,7 +204,7 @@ def fly_in_threads(
 
 
 def name_upstream(campaign: Campaign, case_ids: np.ndarray, flight: Columns) -> None:
-    """Set the reason of cases that lack inputs from upstream to how the upstream case ended."""
+    """Set the reason of cases that lack inputs from upstream to how that case ended; not of the nominal case."""
     if campaign.upstream is not None and case_ids.min() != NOMINAL_CASE:
         reasons = campaign.upstream.refusals(upstream_ids(campaign, case_ids))
         flight["reason"] = np.where(reasons != "", reasons, flight["reason"])

@@ -37,8 +37,8 @@ def events_that_never_happen(
 ) -> Iterator[str]:
     """Sentences on events that happen in none of the cases, of which at least one completes.
 
-    The nominal case is flown first, by Python, and shows most events.  Only for the others is a kernel compiled, which
-    watches them in all cases.
+    The nominal case is flown first, by Python, and shows most events.  Only if events are left is a kernel compiled,
+    which watches them in all cases.
     """
     model = compiled_model(campaign.model)
     stops = [event for event in model.event_list if event.action == "stop"]
