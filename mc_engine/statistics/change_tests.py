@@ -54,7 +54,7 @@ class Estimate:
 
     @property
     def unbounded(self) -> bool:
-        """Whether the cases, or the pairs that differ, are too few for an end of the interval."""
+        """Whether the interval has no end: the cases, or the pairs that differ, are too few for either one."""
         return self.lower == -inf and self.upper == inf
 
     @property
@@ -74,7 +74,7 @@ class MetricChange:
 
     differing : number of pairs whose numbers differ by more than the tolerance; None if unpaired.
     mean, deviation : by run.  shift : from A to B, in the metric's unit.  ratio : spread of B over that of A, both as
-    tested.  shift_p, spread_p : p-values, NaN where nothing can be tested; Holm's adjusted ones.
+    tested.  shift_p, spread_p : p-values, NaN where nothing can be tested; adjusted : by Holm.
     """
 
     metric: str

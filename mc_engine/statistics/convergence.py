@@ -35,7 +35,7 @@ class RunningEstimate:
     """An estimate from the first n cases with its two-sided interval, float64[k] each; NaN: too few for a limit.
 
     probability : of a quantile; None for the mean.  cases : int64[k], tried so far.  n_used of n_tried have a number.
-    reach : distance of the last interval's ends from the estimate, in standard deviations; None with an open end.
+    reach : larger distance of the last interval's ends from the estimate, in standard deviations; None if one is open.
     halves_p : probability of a difference at least as large as that of the two halves by chance alone.
     tails : for a mean, the mean |x - mean|³ over σ³ √n; 0 for a quantile, whose interval is exact.
     """

@@ -10,8 +10,8 @@ too.
 
 Sobol' points are not independent: the few of them in a narrow part of one input may all lie in one half of another one,
 which then separates failed from passed cases without an effect.  With 10 to 19 failed cases, inputs without effect were
-found in 30 % of tests, and with independent cases in 9 %; with 20 and more no more often than these.  Pairs without
-effect were found in up to a third of tests, so pairs are not tested.
+found in 30 % of tests, and with independent cases in 9 %; with 20 and more as rarely as with independent cases.  Pairs
+without effect were found in up to a third of tests, so pairs are not tested.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -75,7 +75,7 @@ class Drivers:
 class SuccessCurve:
     """Success probability in bins of an input, with Clopper-Pearson limits; all float64[n_bins] or int64[n_bins].
 
-    middle, low, high : of the input's values in the bin; for words, the index of the level.
+    middle, low, high : of the input's values in the bin; for words and switches, the index of the level.
     """
 
     middle: np.ndarray
@@ -254,7 +254,7 @@ def _level_test(requirement: str, column: InputColumn, failed: np.ndarray) -> Dr
 
 
 def _scores(column: InputColumn) -> list[np.ndarray]:
-    """Centred scores of a column that products are made of: the rank, or a column for each level of a group."""
+    """Centred scores of a column that products are made of: the rank, or, for more than two levels, a column each."""
     if column.ordered:
         ranks = average_ranks(column.values)
         return [2.0 * ranks / (ranks.size + 1) - 1.0]

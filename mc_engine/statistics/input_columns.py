@@ -74,7 +74,7 @@ def average_ranks(values: np.ndarray) -> np.ndarray:
 
 
 def rank_correlations(columns: Sequence[InputColumn]) -> np.ndarray:
-    """Spearman's correlation of each two inputs, float64[n_columns, n_columns]; 0 of a group and of itself."""
+    """Spearman's correlation of each two inputs, float64[n_columns, n_columns]; 0 with itself, or without an order."""
     found = np.zeros((len(columns), len(columns)))
     usable = [k for k, column in enumerate(columns) if column.ordered and column.varies]
     if len(usable) > 1:
@@ -92,7 +92,7 @@ def beyond_chance(rank_correlation: Any, n_cases: int) -> Any:
 def equal_bins(column: InputColumn, bins: int) -> tuple[np.ndarray, int]:
     """Bin of each case (int64[n]) and the number of bins: about equally full, ties together, no bin empty.
 
-    Words, and numbers with at most `bins` different values, have a bin for each level or value.
+    Words, switches, and numbers with at most `bins` different values have a bin for each level or value.
     """
     distinct, index = np.unique(column.values, return_inverse=True)
     if not column.levels and distinct.size > bins:

@@ -28,10 +28,11 @@ FRESH = -1  # in place of a noise address: noise that no case has had yet
 class Level:
     """One level on the way to the failures.
 
-    margin : all cases of the level are at or below it (mean over the runs).  probability : of such a margin.
+    margin : all cases of the level are at or below it; for importance sampling, the median margin of the cases on which
+        the next level is based.  probability : of a margin at or below it, mean over the runs.
     runs : number of independent runs that reached the level.  cases : flown for it.
-    accepted : accepted fraction of the steps of its chains; for importance sampling, the fraction of its cases on which
-        the next level is based.
+    accepted : accepted fraction of the steps of its chains; for importance sampling, the effective fraction of its
+        cases on which the next level is based.
     """
 
     margin: float

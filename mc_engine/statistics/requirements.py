@@ -76,7 +76,7 @@ class Verdict:
     enclosed : tuple or None, for a requirement with two limits the two that the cases demonstrate: the required ones
         moved inward by the same distance, the margin, or outward if it is negative
     needed : int or None, total number of cases with which an extended run demonstrates the share if no further case
-        fails, or a new run if the design cannot be extended; None if the verdict is decided
+        fails, or, if the design cannot be extended, a new run with as many failures; None if the verdict is decided
     accepted : int or None, most failures with which this number of cases passes; None if it cannot pass
     consumer_risk : float or None, probability of passing a system that just misses the share; None if the number of
         cases was decided along the way: then it is at most 1 - confidence
@@ -185,7 +185,7 @@ def judge_counted(
 
     ranked : (Judged, rank from 1) to the order statistic of the usable values; None: no demonstrated bounds.
     looked : whether the number of cases was decided by looking at the results.  The joint verdict is also None if the
-    joint probability to be demonstrated is zero.  Its confidence is the smallest of theirs.
+    joint probability to be demonstrated is not positive.  Its confidence is the smallest of theirs.
     """
     requirements = counts.requirements
     share = (

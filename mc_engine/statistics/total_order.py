@@ -89,7 +89,7 @@ def total_order(columns: Sequence[InputColumn], table: np.ndarray) -> tuple[np.n
 
 
 def _functions(column: InputColumn, n: int) -> _Functions:
-    """Functions of one input, orthonormal over the cases: polynomials, or differences between the levels of a group."""
+    """Functions of one input, orthonormal over the cases: polynomials, or differences between its levels."""
     if column.levels:
         levels = np.unique(column.values)[1 : MOST_DEGREE + 1]
         return _orthonormal([(column.values == level).astype(np.float64) for level in levels], [1] * len(levels))
