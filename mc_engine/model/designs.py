@@ -44,7 +44,7 @@ def kept_design(design: Callable[..., np.ndarray], *inputs: Any) -> np.ndarray:
 
     A design is computed again after a change of its inputs, of a source in the folder of `design` or imported from
     there, of the engine's physics, of NumPy or SciPy, or of the processor, and if its file is damaged.  If the cache
-    cannot be written, the result is the same, but each process computes it anew.
+    cannot be written, the result is the same, but each call computes it anew.
 
     Raises TypeError for inputs of other types, which cannot be compared with those of a kept design.
 

@@ -135,7 +135,7 @@ def _files_named(names: Iterable[str], folder: Path) -> dict[Path, bytes]:
 
 
 def sources_beside(file: Path) -> dict[Path, bytes]:
-    """Sources of a model that is a file: all files next to it, and whole folders next to it that they import."""
+    """Sources of a model that is a file: all Python files next to it, and whole folders there that they import."""
     contents = {**_contents(file.parent.glob("*.py")), file: file.read_bytes()}
     waiting, seen = [file], set[str]()
     while waiting:
