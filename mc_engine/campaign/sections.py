@@ -355,7 +355,7 @@ AnyDispersion = (
 
 
 class InputsSection(Section):
-    """[inputs]: parameters that every case takes from the case with its number in another run, flown before."""
+    """[inputs]: parameters that every case takes from the case with the same number in another run, flown before."""
 
     source: str = Field(alias="from", min_length=1, description='a run, or the campaign to be flown first: "deorbit"')
     columns: dict[str, str] = Field(
@@ -377,7 +377,7 @@ class CampaignFile(Section):
 
     campaign: CampaignSection = Field(description="the table [campaign] with model, design, ...")
     parameters: dict[str, Value] = Field(default_factory=dict, description="other nominal values and settings")
-    dispersion: dict[str, AnyDispersion] = Field(default_factory=dict, description="spread of inputs, by parameter")
+    dispersion: dict[str, AnyDispersion] = Field(default_factory=dict, description="dispersed inputs, by parameter")
     correlation: list[CorrelationSection] = Field(default_factory=list, description="of pairs of dispersions")
     covariance: dict[str, CovarianceSection] = Field(default_factory=dict, description="from orbit messages, by name")
     inputs: InputsSection | None = Field(default=None, description="inputs taken from another run, case by case")
