@@ -361,7 +361,7 @@ def rerun(
     memory: Memory = None,
     patience: Patience = None,
 ) -> None:
-    """Fly the failed cases of a run again. They fly in processes, for example after their worker was killed."""
+    """Fly the failed cases of a run again, such as after their worker was killed. They fly in processes."""
     store = existing_run(folder)
     if not failed:
         leave(USAGE, "rerun flies only failed cases again: add --failed; the others would come out with the same bits")

@@ -49,8 +49,8 @@ def debug(
     """Fly one case by Python and stop in a debugger. It stops inside the model's own functions.
 
     Without an option it stops at the first line of rhs, at the start. If the physics contains breakpoint() or print, it
-    stops only there. The debugger is that of Python's breakpoint(): pdb, or the one that PYTHONBREAKPOINT names.
-    Without a terminal it reads its commands from standard input.
+    stops only at each breakpoint(). The debugger is that of Python's breakpoint(): pdb, or the one that
+    PYTHONBREAKPOINT names. Without a terminal it reads its commands from standard input.
     """
     from bdb import BdbQuit
 
