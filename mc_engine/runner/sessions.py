@@ -122,7 +122,7 @@ def _has_companion(store: Store, campaign: Campaign) -> bool:
 
 
 def _counting(session: Session, flown: int, cases: int, failed: int = 0) -> Session:
-    """The session whose progress also counts the `cases` of another stage, of which `flown` and `failed` are done."""
+    """The session whose progress also counts the `cases` of another stage, `flown` of them done, `failed` failed."""
     report = session.progress
     if report is None:
         return session
