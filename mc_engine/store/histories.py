@@ -32,7 +32,7 @@ def rows_to_keep(record: np.ndarray, rows: int, lines: slice = slice(None), n_ro
     rows : number of rows to keep.  Always kept are the first and the last row, both sides of every event, and both
         sides of samples at which a quantity jumps by more than a hundredth of its range, up to twice `rows` of these,
         the largest.  The others are where linear interpolation between them has the largest errors, and a fifth of them
-        evenly in time.  They are at least half of `rows`, in addition to the others if events and samples are many.
+        evenly in time.  They are at least half of `rows`, in addition to those always kept if these are many.
 
     Rows that repeat the one before are not counted.  All rows are kept if there are no more than wanted.
     The density of the others is that of C. de Boor, A Practical Guide to Splines, 1978, chapter XII: the square root of
