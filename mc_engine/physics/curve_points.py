@@ -115,7 +115,7 @@ def path_beside_caller(file: object) -> Path:
 def array_of(values: Any, name: str, unit: str | None = None, dimensions: int = 1) -> np.ndarray:
     """The numbers of an argument, in SI.  unit : of the numbers given, None for SI.
 
-    Raises ModelError for the name of a column without a file, and for a wrong number of dimensions.
+    Raises ModelError for the name of a column without a file, and for anything but numbers with these dimensions.
     """
     if isinstance(values, str):
         raise ModelError(f'"{values}" is a column, but there is no file; give {name} as numbers')

@@ -144,7 +144,10 @@ def aerodynamic_force(pressure, area, alpha, beta, drag, side, lift):
 
 @physics
 def aerodynamic_moment(pressure, area, length, roll, pitch, yaw):
-    """Moment [N m] by coefficients about the body axes.  pressure, area : as in `aerodynamic_force`;  length : [m]."""
+    """Moment [N m] by coefficients about the body axes.
+
+    pressure, area : as in `aerodynamic_force`;  length : reference length [m].
+    """
     size = pressure * area * length
     return Vector(size * roll, size * pitch, size * yaw)
 
