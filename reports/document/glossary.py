@@ -20,7 +20,7 @@ GLOSSARY = Terms(
         ),
         (
             "metric",
-            "A number that is computed for each flight. A failed case has none: it is counted, never dropped.",
+            "A number that describes the result of a flight. A failed case has none: it is counted, never dropped.",
         ),
         (
             "n of n tried",
@@ -73,7 +73,7 @@ GLOSSARY = Terms(
             "exactness of the bounds",
             "Bounds and intervals are exact for independent draws (mc) if the number of cases was fixed in advance, "
             "unless the report says otherwise. Latin hypercube and Sobol designs scatter less, so the same bounds are "
-            "then conservative. They do not cover errors of the model.",
+            "then conservative. Bounds do not cover errors of the model.",
         ),
         (
             "ellipse",
