@@ -1,4 +1,4 @@
-"""The cache folder of the engine: compiled kernels, designs of models, nominal flights of `check`."""
+"""The cache folder, for what can be computed again: compiled kernels, designs of models, nominal flights of `check`."""
 
 import os
 import stat

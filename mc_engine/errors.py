@@ -92,7 +92,7 @@ class StoreError(EngineError):
 
 
 class DiskError(StoreError):
-    """The disk refused an operation; the text names the path.  Committed cases are safe."""
+    """The disk refused an operation; the text names the path.  What was committed before is safe."""
 
 
 class UsageError(StoreError):

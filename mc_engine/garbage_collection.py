@@ -15,7 +15,7 @@ def collect_rarely() -> None:
 
     A command makes tens of thousands of objects and hardly any garbage.  When the interpreter ends, it would search all
     of them several times, which takes longer than loading numpy.  Functions registered by `atexit` and
-    `weakref.finalize` still run; `__del__` of objects in cycles does not, which Python does not promise either.
+    `weakref.finalize` still run; `__del__` of objects then in cycles does not, which Python does not promise either.
     """
     gc.set_threshold(_NEW_OBJECTS)
     atexit.register(gc.freeze)
