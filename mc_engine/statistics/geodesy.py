@@ -53,7 +53,7 @@ class LocalPlane:
         return np.asarray(latitude), np.asarray(longitude)
 
     def stretch(self, distance: float) -> float:
-        """Factor by which lengths perpendicular to the direction to the origin are too large at a distance [m]."""
+        """Fraction by which lengths perpendicular to the direction to the origin are too large at a distance [m]."""
         angle = distance / self.ellipsoid[0]
         return float(1.0 / np.sinc(angle / np.pi) - 1.0)
 

@@ -30,7 +30,7 @@ class Normality:
 
     @property
     def looks_normal(self) -> bool:
-        """Whether neither the test nor skewness and kurtosis contradict a normal distribution."""
+        """Whether the test does not reject a normal distribution, or skewness and kurtosis are near those of one."""
         return self.p_value >= 0.01 or (abs(self.skewness) < 0.05 and abs(self.excess_kurtosis) < 0.1)
 
 
