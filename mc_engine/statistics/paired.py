@@ -31,7 +31,7 @@ def matching_rows(choice: np.ndarray, levels: Sequence[str], others: Mapping[str
     """int64[n_groups, n_levels]: rows of cases that differ only in the choice, one column for each level.
 
     choice : the level of each case;  others : every other dispersed input.  Cases without a partner at every level,
-    and duplicates, are in no group.
+    and those flown more than once, are in no group.
     """
     table = pd.DataFrame({f"input {k}": values for k, values in enumerate(others.values())})
     if table.shape[1] == 0:

@@ -142,8 +142,8 @@ def _failed_inputs(limit: LimitState, estimate: RareEvent) -> tuple[list[dict[st
     """The inputs of failed cases: one record for each input, and a remark if one mean does not describe them.
 
     The most probable failed case is the one nearest to the origin of standard normal space, where the density is
-    largest: the nearest one flown to the design point of structural reliability.  If failures are in several regions,
-    the most probable failed case on the opposite side of the origin is added, if there is one.
+    largest: an estimate of the design point of structural reliability.  If failures are in several regions, the most
+    probable failed case on the opposite side of the origin is added, if there is one.
     """
     failed = np.flatnonzero(estimate.cases.failed)
     if not failed.size:

@@ -71,7 +71,7 @@ GLOSSARY = Terms(
         ),
         (
             "exactness of the bounds",
-            "Bounds and intervals are exact for independent draws (mc) if the number of cases was fixed in advance, "
+            "Bounds and intervals are exact for independent draws (mc). The number of cases was fixed in advance "
             "unless the report says otherwise. Latin hypercube and Sobol designs scatter less, so the same bounds are "
             "then conservative. Bounds do not cover errors of the model.",
         ),
