@@ -97,7 +97,7 @@ grid_time = compile_inline(_grid_time)
 
 
 def _last_five(number, t, h, closing):
-    """Times of five looks, see `track_by_three`."""
+    """Times of the last five values, see `track_by_three`."""
     before, ago = number - 1, grid_time(number - 2, h, t)
     if closing:  # the last twice: nothing is known of what comes after it
         return grid_time(number - 3, h, t), ago, grid_time(before, h, t), t, t
@@ -146,7 +146,7 @@ def _track(past, number, t, h, closing, lanes, smooth, seen, lasts, best, when, 
 
 
 def _newest_twice(seen):
-    """The last four of five looks, and the newest again."""
+    """The last four of five values, and the newest again."""
     return seen[1], seen[2], seen[3], seen[4], seen[4]
 
 

@@ -218,7 +218,7 @@ form_differences = compile_callable(_form_differences)
 
 
 def _interpolate(differences, count, x):
-    """Value, slope and curvature, per step, of the polynomial through `count` looks, x steps after the newest.
+    """Value, slope and curvature, per step, of the polynomial through `count` values, x steps after the newest.
 
     Newton's backward formula, D0 + x (D1 + (x + 1) / 2 (D2 + (x + 2) / 3 (D3 + ...))), with its derivatives.
     E. Hairer, S. Norsett, G. Wanner, section III.1.
@@ -378,7 +378,7 @@ track_by_all = compile_callable(_track_by_all)
 
 
 def _track(past, number, t, h, closing, lanes, smooth, seen, lasts, best, when, last):
-    """Running extrema and past after one more look, see `Method`; it is of the motion that its slope will be of."""
+    """Running extrema and past after one more value, see `Method`; it is of the motion that its slope will be of."""
     looks, count, v1, v2, v3 = past.looks, past.known + 1.0, seen[2], seen[3], seen[4]
     crests = lanes & any_field(map_fields(extrema.crest, v1, v2, v3, best))
     if any_lane(crests):  # of outputs with corners that is all

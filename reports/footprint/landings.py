@@ -40,7 +40,7 @@ class Landing:
         return self.misses[0] if self.misses else ""
 
     def geodesics(self, place: Mark) -> np.ndarray:
-        """Kilometres of all cases from a place; NaN for those that did not come down."""
+        """Kilometres of all cases from a point; NaN for those that did not land."""
         distances = np.full(self.latitude.size, np.nan)
         plane = LocalPlane(place.latitude, place.longitude, self.footprint.plane.ellipsoid)
         points = plane.points(self.latitude[self.rows], self.longitude[self.rows])
@@ -48,7 +48,7 @@ class Landing:
         return distances
 
     def distances(self, flown: Flown, place: Mark) -> np.ndarray:
-        """Kilometres of all cases from a point; from the target, by the metric that is this distance."""
+        """As `geodesics`, but from the target by the metric that is this distance, if there is one."""
         if not self.miss or place.name != TARGET:
             return self.geodesics(place)
         distances = np.full(self.latitude.size, np.nan)
@@ -96,7 +96,7 @@ def landing_of(flown: Flown, figure: FootprintFigure) -> Landing | str:
 def _misses(flown: Flown, landing: Landing) -> tuple[str, ...]:
     """The metrics that agree with the geodesic from the target, that whose greatest deviation is smallest first.
 
-    They agree in all cases that have a number, which at least half of those that came down must have.
+    They agree in all cases that have a number, which at least half of those that landed must have.
     """
     if landing.centre.name != TARGET:
         return ()
@@ -117,7 +117,7 @@ def _kilometres(flown: Flown, metric: str) -> np.ndarray:
 
 
 def landed(flown: Flown, figure: FootprintFigure) -> tuple[np.ndarray, np.ndarray]:
-    """Latitude and longitude, float64[k] degrees, of the cases that came down."""
+    """Latitude and longitude, float64[k] degrees, of the cases that landed."""
     rows = _placed(flown, figure) & _down(flown, figure)
     return flown.values(figure.latitude)[rows], flown.values(figure.longitude)[rows]
 
