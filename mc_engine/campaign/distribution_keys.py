@@ -141,7 +141,7 @@ def _triangular(context: DispersionContext) -> Distribution | None:
 
 
 def _bounds(context: DispersionContext, middle: str) -> tuple[float, float] | None:
-    """(lower, upper) as given, or by half_range about the middle; with lower and upper the middle is not used."""
+    """(lower, upper) as given, which excludes a `mean`; or by half_range about the value of the key `middle`."""
     keys = context.keys
     plain = [keys.lower, keys.upper]
     if keys.half_range is None and None not in plain:

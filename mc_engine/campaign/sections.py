@@ -129,7 +129,7 @@ class UniformDispersion(DispersionSection):
     """Needs lower and upper, or half_range about mean."""
 
     dist: Literal["uniform"]
-    mean: Number | None = Field(default=None, description="middle of the range; default: the nominal value")
+    mean: Number | None = Field(default=None, description="middle, for half_range; default: the nominal value")
     half_range: Positive | None = Field(default=None, description="half of upper - lower")
     lower: Number | None = Field(default=None, description="smallest value")
     upper: Number | None = Field(default=None, description="largest value")
