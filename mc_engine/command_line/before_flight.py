@@ -67,7 +67,7 @@ def check(
     """Report all errors in a campaign file and its model.
 
     A few cases are flown in a separate process.  All results must exist and not depend on the other cases in the batch,
-    every dispersion must have an effect, every metric must vary, and every event must happen.
+    every dispersion must have an effect, no metric may be a fixed number, and every event must happen.
     """
     with _flights_beside(file) if model else nullcontext() as process:
         campaign, flyer, problems = _checked(file, process)

@@ -1,8 +1,8 @@
 """Checks of a model's contract by flying a few cases of its campaign several times.
 
 Results must exist, repeat, and not depend on the other cases in the batch.  Every dispersion must have an effect,
-every metric must vary, and every event must happen.  `python -m mc_engine.flight.contract_flight FILE` prints the
-sentences as JSON; `check` runs it as a separate process, because the model may crash or hang.
+no metric may be a fixed number, and every event must happen.  `python -m mc_engine.flight.contract_flight FILE` prints
+the sentences as JSON; `check` runs it as a separate process, because the model may crash or hang.
 """
 
 import json
