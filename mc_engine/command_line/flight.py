@@ -361,7 +361,7 @@ def rerun(
     memory: Memory = None,
     patience: Patience = None,
 ) -> None:
-    """Fly the failed cases of a run again, such as after their worker was killed. They fly in processes."""
+    """Fly the failed cases of a run again. They fly in processes, in case their worker was killed from outside."""
     store = existing_run(folder)
     if not failed:
         leave(USAGE, "rerun flies only failed cases again: add --failed; the others would come out with the same bits")
