@@ -89,7 +89,7 @@ def model(
         events must name its class in `memory`, too
     control : takes draws, too; returns the next discrete state at each sample, the first at t = 0
     extrema : dict of further extrema for `best` and `when`, such as {"force": maximum_of("force_n")}.  Extrema that are
-        metrics are there under the names of the metrics, without unit.
+        metrics are there under the names of the metrics, without unit; one of several metrics under that of the first.
     prepare(inputs, settings, refusals) : NumPy code for many cases; returns a dict with an SI array, or one number for
         all cases, for each field of `kernel_parameters`, such as {**vars(inputs), "burn_dv": dv}.  inputs and settings
         have attributes without unit, `inputs.altitude` for altitude_km.  Cases that cannot start go to `refusals`.
