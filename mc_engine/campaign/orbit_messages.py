@@ -48,7 +48,7 @@ class UncertainState:
         """The covariance in other axes: "RTN", "TNW", or the frame of the state itself.
 
         The local axes are taken as inertial, as they are at the epoch: position and velocity are rotated by the same
-        matrix, without the rate of the axes.  MessageFault for any other pair of frames, and without a state.
+        matrix, without the rate of the axes.  MessageFault for any other frames, and for local axes without a state.
         """
         wanted = _plain_frame(frame)
         if wanted == self.covariance_frame:
