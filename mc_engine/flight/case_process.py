@@ -23,7 +23,7 @@ from typing import Any
 
 from mc_engine.errors import DiskError, ModelError, StoreError
 from mc_engine.flight.case_worker import STDERR, STDOUT, Order, Setup, end_of
-from mc_engine.flight.flyer import RunStopped
+from mc_engine.flight.flyer import RunStopped, never
 from mc_engine.flight.program_flight import end_noted
 from mc_engine.process_tree import WORK, how_it_ended, last_lines
 from mc_engine.safe_path import safe_environment
@@ -31,6 +31,7 @@ from mc_engine.status import CRASHED, TIME_LIMIT
 
 _WORKER = "mc_engine.flight.case_worker"
 START_S = 600.0  # for `start`
+JOB_S = 2.0  # in which all processes of a job that is ended have SIGTERM
 END_S = 5.0  # in which a process and all that it began should have ended by SIGHUP
 LOOK_EVERY_S = 0.2  # whether the run is to stop
 _idle: dict[tuple[Any, ...], list["CaseProcess"]] = {}
@@ -47,6 +48,10 @@ class CaseEnded(Exception):
     def __init__(self, status: int, reason: str):
         super().__init__(reason)
         self.status, self.reason = status, reason
+
+
+class TerminatedAtStart(ModelError):
+    """A process was ended by SIGTERM before it was ready, perhaps with all processes of a job."""
 
 
 class CaseProcess:
@@ -66,14 +71,17 @@ class CaseProcess:
         self._connection: Connection[Any, Any] = Connection(ours.detach())
         self._replies = select.poll()  # once, as `Connection.poll` makes a new one each time
         self._replies.register(self._connection.fileno(), select.POLLIN)
+        kind = ModelError
         try:
             self._connection.send(setup)
             fault = self._connection.recv() if self._connection.poll(START_S) else f"took longer than {START_S:.0f} s"
         except (EOFError, OSError):
-            fault = f"{how_it_ended(self._process.wait())}{_crash_site(end_of(self.work / STDERR))}"
+            code = self._process.wait()
+            fault = f"{how_it_ended(code)}{_crash_site(end_of(self.work / STDERR))}"
+            kind = TerminatedAtStart if code == -signal.SIGTERM else ModelError
         if fault:
             self.end()
-            raise ModelError(f"{setup.reference}: {fault}")
+            raise kind(f"{setup.reference}: {fault}")
 
     def _start(self, descriptor: int) -> "subprocess.Popen[bytes]":
         command = [sys.executable, "-m", "mc_engine.process_tree", _WORKER, str(descriptor), str(self.work)]
@@ -163,17 +171,38 @@ def _crash_site(stderr: bytes) -> str:
     return last_lines(stderr)
 
 
-def take(key: tuple[Any, ...], setup: Callable[[], Setup]) -> CaseProcess:
-    """A process that waits for cases of the simulator `key`, or a new one."""
+def take(key: tuple[Any, ...], setup: Callable[[], Setup], stopped: Callable[[], bool] = never) -> CaseProcess:
+    """A process that waits for cases of the simulator `key`, or a new one.
+
+    A new process that SIGTERM ends while it starts is started once more.  If a whole job is ended, the engine gets the
+    signal, too: then `stopped()` becomes true, and RunStopped is raised.
+    """
+    terminated = False
     while True:
         with _lock:
             waiting = _idle.get(key)
             process = waiting.pop() if waiting else None
         if process is None:
-            return CaseProcess(setup())
-        if process.is_alive():
+            try:
+                return CaseProcess(setup())
+            except TerminatedAtStart:
+                if terminated:
+                    raise
+                terminated = True
+                _wait_for_stop(stopped)
+        elif process.is_alive():
             return process
-        process.end()
+        else:
+            process.end()
+
+
+def _wait_for_stop(stopped: Callable[[], bool]) -> None:
+    """RunStopped if the engine is stopped in the next moments."""
+    end = time.monotonic() + JOB_S
+    while time.monotonic() < end:
+        if stopped():
+            raise RunStopped
+        time.sleep(LOOK_EVERY_S)
 
 
 @atexit.register

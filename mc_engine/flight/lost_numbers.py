@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from mc_engine.campaign.loading import Campaign
 from mc_engine.flight.flight import fly_interpreted
 from mc_engine.flight.flyer import NOMINAL_NOISE
 from mc_engine.lanes.number import Origin
-from mc_engine.model.faults import origin_sentence, place_in_model
+from mc_engine.model.faults import is_the_users, origin_sentence, place_in_model
 from mc_engine.model.record import Model, compiled_model
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
 
@@ -79,6 +80,7 @@ def origin_of(flight: "InterpretedFlight", status: int) -> tuple[Origin | None, 
     if status == NOT_FINITE:
         return flight.origin, ""
     for metric, value in zip(flight.model.metrics, flight.metrics, strict=False):
-        if status == OK and math.isnan(value) and not metric.sometimes and value.origin is not None:
-            return value.origin, metric.name
+        if status == OK and math.isnan(value) and not metric.sometimes and (origin := value.origin) is not None:
+            if any(is_the_users(Path(place.file)) for place in origin.places):  # not of an event that did not happen
+                return origin, metric.name
     return None, ""

@@ -172,9 +172,9 @@ class SimulatorFlyer(Flyer):
         )
         return lines
 
-    def process(self) -> CaseProcess:
+    def process(self, stopped: Callable[[], bool] = never) -> CaseProcess:
         """A process of this simulator, from those that wait or new."""
-        return take(self._key, self._setup)
+        return take(self._key, self._setup, stopped)
 
     def give_back(self, process: CaseProcess) -> None:
         give_back(self._key, process)
@@ -231,7 +231,7 @@ class _Flight:
         while left:
             if self._stopped():
                 raise RunStopped
-            process = self._flyer.process()
+            process = self._flyer.process(self._stopped)
             try:
                 for reply in process.replies(self._order(left), len(left), self._limit_s, self._stopped):
                     self._take(left.pop(0), reply)
@@ -247,7 +247,7 @@ class _Flight:
         """Cases as one batch; where it fails as a whole, by halves, until the case is found."""
         if not places:
             return
-        process = self._flyer.process()
+        process = self._flyer.process(self._stopped)
         limit = None if self._limit_s is None else self._limit_s * len(places)
         try:
             reply = next(process.replies(self._order(places), 1, limit, self._stopped))

@@ -1,6 +1,8 @@
 """All that a run can be part of, with simulators: shards, clusters, studies, ways to give results, imports."""
 
 import json
+import subprocess
+import sys
 from collections import Counter
 
 import numpy as np
@@ -10,6 +12,8 @@ from typer.testing import CliRunner
 
 from mc_engine import load_campaign, open_run, open_store, run
 from mc_engine.command_line.commands import app
+from mc_engine.errors import ModelError
+from mc_engine.flight import case_process
 from mc_engine.flight.program_flight import _document
 from mc_engine.runner.backends import Backend
 from mc_engine.runner.runner import merge
@@ -223,3 +227,25 @@ def test_check_tells_of_declared_outputs_of_which_no_history_comes(tmp_path):
         said = CliRunner().invoke(app, ["check", str(python_campaign(tmp_path / folder, cases=1, fault=lines))])
         assert said.exit_code == 0
         assert (told in said.stdout) == expected
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_process_that_sigterm_ends_while_it_starts_is_started_once_more(tmp_path, times, monkeypatch):
+    """As one of a job that is ended; what always ends so is at fault."""
+    start, begun = case_process.CaseProcess._start, []
+
+    def start_and_end(process, descriptor):
+        begun.append(process)
+        if len(begun) > times:
+            return start(process, descriptor)
+        return subprocess.Popen([sys.executable, "-c", "import os; os.kill(os.getpid(), 15)"])
+
+    monkeypatch.setattr(case_process.CaseProcess, "_start", start_and_end)
+    monkeypatch.setattr(case_process, "JOB_S", 0.1)
+    campaign = load_campaign(python_campaign(tmp_path / "ball", cases=2))
+    if times == 1:
+        assert set(run(campaign, tmp_path / "run", workers=1).cases()["status"]) == {"ok"}
+    else:
+        with pytest.raises(ModelError, match="ended by SIGTERM"):
+            run(campaign, tmp_path / "run", workers=1)
+    assert len(begun) == 2
