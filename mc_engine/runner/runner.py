@@ -5,8 +5,8 @@ campaign, sources, seed and case_id, and not on chunks, workers or backend.
 """
 
 import re
-import shutil
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,10 +16,12 @@ import numpy as np
 from mc_engine.campaign.cases import case_table
 from mc_engine.campaign.loading import Campaign, load_campaign, refuse_no_campaign
 from mc_engine.campaign.sections import HistoriesSection
+from mc_engine.durable_file import remove_folder
 from mc_engine.errors import CampaignError, EngineError, ModelError, Problem, StoreError
 from mc_engine.flight.chunks import name_upstream
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import in_threads
+from mc_engine.model.simulator import Simulator
 from mc_engine.runner.backends import Backend, flyer_on
 from mc_engine.runner.flown_campaign import campaign_of, companions_of, refuse_undeclared_data
 from mc_engine.runner.histories import history_frame, inputs_of
@@ -30,10 +32,12 @@ from mc_engine.runner.shards import Shard, merge_shards
 from mc_engine.sampling.designs import block_problem, extension_problem
 from mc_engine.store.case_rows import recorded_cases
 from mc_engine.store.opening import open_store
+from mc_engine.store.parts import PART_FOLDERS
 from mc_engine.store.repair import mend_journal
-from mc_engine.store.run_files import JOURNAL, default_folder, path_of
+from mc_engine.store.run_files import CAMPAIGN, JOURNAL, MANIFEST, NOMINAL, SIMULATOR, default_folder, path_of
 from mc_engine.store.store import Store, create_store
 from mc_engine.store.urls import is_url
+from mc_engine.store.writer_lock import LOCK_FILES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -91,8 +95,9 @@ def run(
     from another one that has yet to be flown, that one is flown first, into a directory next to `out`.
 
     Raises StoreError if `out` is occupied or a URL, and RunInterrupted on Ctrl-C or a full disk; completed chunks are
-    kept, and `resume` flies the rest.  Raises ModelError if the model is at fault; if no case has completed, `out` is
-    removed, so that the same call flies the corrected model.
+    kept, and `resume` flies the rest.  Raises ModelError if the model is at fault; if no case has completed, the run is
+    removed, so that the same call flies the corrected model.  The nominal case counts for a simulator, which may take
+    hours for it.
 
     >>> store = run(load_campaign("minimal", cases=8), "runs/example")
     >>> store.cases()["apogee_altitude_km"].median().round(1)
@@ -111,13 +116,24 @@ def run(
     manifest = manifest_of(campaign)
     if shard is not None:
         manifest["shard"] = shard.record(campaign.cases)
-    store = create_store(path, manifest, campaign.text, columns_of(campaign), companions_of(campaign))
+    companions = companions_of(campaign)
+    store = create_store(path, manifest, campaign.text, columns_of(campaign), companions)
     try:
         return complete(store, campaign, session)
     except ModelError:
-        if not store.parts and not recorded_cases(store.path):  # `resume` would fly its copy of the faulty model
-            shutil.rmtree(store.path, ignore_errors=True)
+        dear = store.nominal_part is not None and isinstance(campaign.model, Simulator)
+        if not (dear or store.parts or recorded_cases(path)):  # `resume` would fly its copy of the faulty model
+            _remove(path, companions)
         raise
+
+
+def _remove(path: Path, companions: Iterable[str]) -> None:
+    """Remove what a run has written in its directory, and the directory if nothing else is in it."""
+    own = (CAMPAIGN, MANIFEST, NOMINAL, SIMULATOR, *PART_FOLDERS, *{Path(name).parts[0] for name in companions})
+    with suppress(OSError, StoreError):
+        for name in (JOURNAL, *own, *LOCK_FILES):  # the journal first: a directory without it is no run
+            remove_folder(path, name)
+        path.rmdir()
 
 
 def _after_first(campaign: Campaign, path: Path, session: Session) -> Campaign:

@@ -249,3 +249,15 @@ def test_a_process_that_sigterm_ends_while_it_starts_is_started_once_more(tmp_pa
         with pytest.raises(ModelError, match="ended by SIGTERM"):
             run(campaign, tmp_path / "run", workers=1)
     assert len(begun) == 2
+
+
+def test_a_process_that_cannot_start_after_the_nominal_case_leaves_a_run_that_resumes(tmp_path):
+    """The nominal case of a simulator may have taken hours, and a licence may be missing for a moment."""
+    busy = tmp_path / "busy"
+    imports = f"from pathlib import Path\nif Path({str(busy)!r}).exists(): raise OSError('no licence')\n"
+    fault = f"open({str(busy)!r}, 'w').close()\nif np.size(case.id) > 1: import os; os._exit(1)"
+    ball = python_campaign(tmp_path / "ball", cases=4, imports=imports, fault=fault, options=BATCH)
+    with pytest.raises(ModelError, match="no licence"):
+        run(load_campaign(ball), tmp_path / "run", workers=1)
+    busy.unlink()
+    assert open_store(tmp_path / "run").nominal()["status"] == "ok"

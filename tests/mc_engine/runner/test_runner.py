@@ -299,6 +299,15 @@ def test_a_model_that_breaks_while_preparing_is_named_with_its_cases_and_leaves_
     source = source.replace("MODEL = model(", f"{broken}MODEL = model(")
     (tmp_path / "model.py").write_text(source)
     (tmp_path / "campaign.toml").write_text(load_campaign("minimal").text)
-    with pytest.raises(ModelError, match=r"cases \d+ to \d+ cannot be flown: model.py, line \d+: ZeroDivisionError"):
-        runner.run(load_campaign(tmp_path, cases=100), tmp_path / "run")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "link").symlink_to("mine")
+    for out in ("run", "link"):
+        with pytest.raises(ModelError, match=r"cases \d+ to \d+ cannot be flown: model.py, line \d+: ZeroDivision"):
+            runner.run(load_campaign(tmp_path, cases=100), tmp_path / out, progress=note_beside(tmp_path / out))
     assert not (tmp_path / "run").exists()  # so that the same command flies the corrected model
+    assert [file.name for file in (tmp_path / "link").iterdir()] == ["notes.txt"]
+
+
+def note_beside(folder):
+    """Progress that leaves a file of the user in a run directory behind a link."""
+    return lambda *_: folder.is_symlink() and (folder / "notes.txt").write_text("worth keeping")
