@@ -240,7 +240,8 @@ def _always_the_same(campaign: Campaign, flown: Columns) -> Iterator[str]:
 
 
 def _never_above(campaign: Campaign, flown: Columns) -> Iterator[str]:
-    """Last times above a level that no case exceeds, of outputs whose unit is not that of SI, as the level's is."""
+    """Last times above a level that no case exceeds, of outputs in a unit below SI's, such as deg: a level in deg is
+    too high then.  One in km, taken for m, would be too low; no case above it is as it should be."""
     ok = flown["status"] == STATUS_NAME[OK]
     model = compiled_model(campaign.model)
     extrema = {extremum.name: extremum for extremum in model.extrema if extremum.kind == "last_above"}
@@ -249,7 +250,7 @@ def _never_above(campaign: Campaign, flown: Columns) -> Iterator[str]:
             continue
         level, output = extrema[metric.symbol].level, extrema[metric.symbol].quantity
         unit, factor = next((q.unit, q.si_factor) for q in model.quantities if q.name == output)
-        if factor != 1.0:
+        if factor < 1.0:
             yield (
                 f'the metric "{metric.name}" is 0 in all of the {ok.sum()} cases that flew: none has "{output}" above '
                 f"the level of {level / factor:.6g} {unit}; `level` is in SI, so that {unit} are multiplied by "

@@ -111,20 +111,24 @@ def test_metrics_that_are_never_set_infinite_or_constant_are_named_one_by_one(tm
     assert idle.startswith('the metric "idle_m_s" is 7.5 whatever happens; let `evaluate` work it out')
 
 
-@pytest.mark.parametrize(("options", "found"), [("", 1), (", sometimes=True", 0)])
-def test_a_level_that_no_output_exceeds_is_told_in_the_unit_of_the_output(options, found, tmp_path):
-    metric = 'top_speed_m_s=maximum_of("speed_m_s", "largest speed")'
+@pytest.mark.parametrize(("unit", "options", "found"), [("mm", "", 1), ("mm", ", sometimes=True", 0), ("km", "", 0)])
+def test_a_level_that_no_output_exceeds_is_told_where_it_may_be_in_the_small_unit_of_the_output(
+    unit, options, found, tmp_path
+):
+    metric, renamed = 'top_speed_m_s=maximum_of("speed_m_s", "largest speed")', f'altitude_{unit}="altitude"'
     campaign = campaign_with(
         tmp_path,
-        (metric, f'{metric}, high_s=last_above("altitude_km", 1e9, "last time above"{options})'),
+        (metric, f'{metric}, high_s=last_above("altitude_{unit}", 1e9, "last time above"{options})'),
         ("inputs, maximum_of", "inputs, last_above, maximum_of"),
+        ('altitude_km="altitude"', renamed),
+        ('apogee_altitude_km=at_end("altitude_km"', f'apogee_altitude_km=at_end("altitude_{unit}"'),
     )
     told = faults(campaign)
     assert len(told) == found
     sentence = (
-        'the metric "high_s" is 0 in all of the 32 cases that flew: none has "altitude_km" above the level of 1e+06'
+        'the metric "high_s" is 0 in all of the 32 cases that flew: none has "altitude_mm" above the level of 1e+12'
     )
-    assert all(one.startswith(f"{sentence} km; `level` is in SI") for one in told)
+    assert all(one.startswith(f"{sentence} mm; `level` is in SI") for one in told)
 
 
 CLOCK = "FixedStep(step=10.0, until=10_000.0)"
