@@ -29,7 +29,9 @@ def terrestrial_time(mjd_utc: np.ndarray) -> np.ndarray:
     most, in which the Moon goes on by 17".
     """
     # the bare function: `erfa.utctai` warns of every date before 1960 or some years ahead
-    *tai, _ = erfa.ufunc.utctai(_MJD, np.asarray(mjd_utc, dtype=np.float64))
+    *tai, status = erfa.ufunc.utctai(_MJD, np.asarray(mjd_utc, dtype=np.float64))
+    if np.any(status < 0):  # then `tai` is what an earlier call left in memory
+        raise ValueError(f"{mjd_utc} is no modified Julian date from -2431738 to 997599999")
     tt = erfa.taitt(*tai)
     return (tt[0] - _MJD) + tt[1]
 

@@ -108,6 +108,11 @@ def test_dates_before_utc_and_years_ahead_are_no_cause_for_warnings(epoch):
     assert 0.0 <= float(sidereal_angle(epoch)) < 2.0 * np.pi
 
 
+def test_a_date_beyond_the_calendar_is_refused():
+    with pytest.raises(ValueError, match="no modified Julian date"):
+        terrestrial_time(np.array([51544.0, -2.5e6]))
+
+
 @pytest.mark.parametrize("epoch", EPOCHS)
 def test_sidereal_time_is_that_of_the_older_series_and_turns_once_in_a_sidereal_day(epoch):
     assert sidereal_angle(epoch) == pytest.approx(erfa.gmst82(2_400_000.5, epoch), abs=np.radians(0.2 / 3600.0))
