@@ -46,17 +46,19 @@ def designed_blocks(flown: Flown, inputs: Mapping[str, Any]) -> Iterator[FigureB
             f"No indices for {', '.join(silent)}: the same in all cases that have it, or fewer than {FEWEST_BLOCKS} "
             f"whole {BLOCKS[flown.design]} with a number."
         )
-    yield from further_metrics(flown, "in report.json" if flown.design == "saltelli" else "")
+    yield from further_metrics(flown)
     yield "Fractions of the cases of this design estimate no probabilities: its cases are not independent random draws."
 
 
-def further_metrics(flown: Flown, elsewhere: str = "") -> Iterator[str]:
-    """A sentence on the metrics that tables and figures of contributors leave out; `elsewhere` says where they are."""
+def further_metrics(flown: Flown) -> Iterator[str]:
+    """A sentence on the metrics that tables and figures of contributors leave out, and where their effects are."""
     key = flown.key_metrics[:MOST_METRICS]
-    others = sum(name not in key and not summary.constant for name, summary in flown.summaries.items())
+    others = [name for name, summary in flown.summaries.items() if name not in key and not summary.constant]
     if others:
-        where = elsewhere or "not shown; metrics with a requirement or in a figure come first"
-        yield f"The effects on {counted(others, 'other metric')} are {where}."
+        known = flown.contributions.by_metric if flown.contributions else {}
+        elsewhere = "not shown; metrics with a requirement or in a figure come first"
+        where = "in report.json" if known.keys() >= set(others) else elsewhere
+        yield f"The effects on {counted(len(others), 'other metric')} are {where}."
 
 
 def _index_figure(flown: Flown, indices: DesignedIndices, shown: np.ndarray, names: Mapping[str, str]) -> FigureBlock:

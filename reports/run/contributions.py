@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 UNEXPLAINED = "unexplained"
 MOST_METRICS = 8
 MOST_ROWS = 20_000  # of a table, above which cases are picked evenly
+MOST_VALUES = 500_000  # of all metrics in Saltelli's blocks, above which the indices of all take minutes
 
 Interval = tuple[float, float]
 
@@ -112,14 +113,14 @@ class Contributions:
 
 
 def contributions(flown: "Flown") -> Contributions | None:
-    """Contributions to every metric by a companion or by Saltelli's blocks, or to those that matter by a random table;
-    None without any."""
+    """Contributions to every metric by a companion or by Saltelli's blocks, or to those that matter by a random table
+    or by very many blocks; None without any."""
     store, metrics = companion_of(flown), flown.key_metrics[:MOST_METRICS]
     every = list(dict.fromkeys([*metrics, *(fact.name for fact in flown.with_role("metric"))]))
     if store is not None:
         return _of_companion(flown, store, every)
     if flown.design == "saltelli":
-        return _of_blocks(flown, every)
+        return _of_blocks(flown, every if flown.n_held * len(every) <= MOST_VALUES else metrics)
     return _of_table(flown, metrics) if flown.random and flown.n_held >= FEWEST_CASES else None
 
 

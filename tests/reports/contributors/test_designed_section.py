@@ -74,6 +74,14 @@ def test_metrics_that_have_no_row_are_counted_and_those_of_saltelli_are_data():
     assert {one.metric for one in run_data(flown)["contributors"]} == {*flown.summaries}
 
 
+def test_of_very_many_blocks_only_the_metrics_that_matter_have_indices(monkeypatch):
+    """SALib's intervals take seconds for each metric then."""
+    monkeypatch.setattr("reports.run.contributions.MOST_VALUES", 600 * 7)
+    flown = Flown(designed("saltelli"), "run")
+    assert [*flown.contributions.by_metric] == flown.key_metrics[:8] != [*flown.summaries]
+    assert section(designed("saltelli"))[-2].paragraphs[0].startswith("The effects on 4 other metrics are not shown;")
+
+
 def test_cases_of_a_block_at_one_place_count_once_in_a_map():
     """They differ in other inputs one by one; as independent cases they gave a map of their noise."""
     run = designed("saltelli")
