@@ -263,6 +263,12 @@ def copy_into(root: Path, name: str, source: Path) -> None:
                 write_all(descriptor, piece)
 
 
+def remove_if_empty(folder: Path) -> None:
+    """Remove a folder, unless something is in it, or it is the working folder, a link or a mount."""
+    with suppress(OSError):
+        folder.rmdir()
+
+
 def remove_folder(root: Path, name: str) -> None:
     """Remove the folder `name` of a directory with all that is in it, if it exists; of a symbolic link, the link."""
     with _parent(root, name) as (folder, last), suppress(FileNotFoundError):

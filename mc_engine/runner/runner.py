@@ -16,7 +16,7 @@ import numpy as np
 from mc_engine.campaign.cases import case_table
 from mc_engine.campaign.loading import Campaign, load_campaign, refuse_no_campaign
 from mc_engine.campaign.sections import HistoriesSection
-from mc_engine.durable_file import remove_folder
+from mc_engine.durable_file import remove_folder, remove_if_empty
 from mc_engine.errors import CampaignError, EngineError, ModelError, Problem, StoreError
 from mc_engine.flight.chunks import name_upstream
 from mc_engine.flight.flyers import flyer_of
@@ -121,8 +121,8 @@ def run(
     try:
         return complete(store, campaign, session)
     except ModelError:
-        dear = store.nominal_part is not None and isinstance(campaign.model, Simulator)
-        if not (dear or store.parts or recorded_cases(path)):  # `resume` would fly its copy of the faulty model
+        long_flown = isinstance(campaign.model, Simulator) and store.nominal_part is not None
+        if not (long_flown or store.parts or recorded_cases(path)):  # `resume` would fly its copy of the faulty model
             _remove(path, companions)
         raise
 
@@ -133,7 +133,7 @@ def _remove(path: Path, companions: Iterable[str]) -> None:
     with suppress(OSError, StoreError):
         for name in (JOURNAL, *own, *LOCK_FILES):  # the journal first: a directory without it is no run
             remove_folder(path, name)
-        path.rmdir()
+    remove_if_empty(path)
 
 
 def _after_first(campaign: Campaign, path: Path, session: Session) -> Campaign:
