@@ -215,8 +215,13 @@ def interruption_message() -> str:
 
 def raise_if_signalled() -> None:
     """Raise KeyboardInterrupt if a signal has had no effect yet: it came after the last case, or in a callback."""
-    if _COMMAND_LINE.signals:
+    if signalled():
         raise Interrupted
+
+
+def signalled() -> bool:
+    """Whether the command line has had a signal.  A library may raise an error of its own in place of Interrupted."""
+    return _COMMAND_LINE.signals > 0
 
 
 @contextmanager

@@ -21,7 +21,7 @@ import typer
 from typer.core import TyperGroup
 
 from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError, UsageError
-from mc_engine.interruption import INTERRUPTED, interruption_message, under_way
+from mc_engine.interruption import INTERRUPTED, interruption_message, signalled, under_way
 from mc_engine.numbers_in_text import LARGEST_WHOLE, counted, is_real, is_whole
 from mc_engine.shell_words import shell_word
 from mc_engine.store.run_files import NO_TEXT, readable
@@ -182,6 +182,8 @@ def exit_status() -> Iterator[None]:
     except (typer.Exit, typer.Abort, typer.BadParameter, SystemExit):
         raise
     except BaseException as error:  # a panic of a Rust library is no Exception
+        if signalled():
+            leave(INTERRUPTED, interruption_message())
         leave(UNFORESEEN, unforeseen(error))
 
 

@@ -253,8 +253,8 @@ def _never_above(campaign: Campaign, flown: Columns) -> Iterator[str]:
         if factor < 1.0:
             yield (
                 f'the metric "{metric.name}" is 0 in all of the {ok.sum()} cases that flew: none has "{output}" above '
-                f"the level of {level / factor:.6g} {unit}; `level` is in SI, so that {unit} are multiplied by "
-                f"{factor:.6g}; or declare the metric with sometimes=True if it differs only with some settings"
+                f"the level of {level / factor:.6g} {unit}; `level` is in SI: multiply a level in {unit} by "
+                f"{factor:.6g}, or declare the metric with sometimes=True if it differs only with some settings"
             )
 
 

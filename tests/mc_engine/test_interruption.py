@@ -76,6 +76,7 @@ def ended(*words, **options):
         pytest.param("send()", id="in a call"),
         pytest.param('exec("send()", {"send": send})', id="in generated code"),
         pytest.param("send(2)", id="twice"),
+        pytest.param("try: send()\n    except BaseException: raise ValueError from None", id="made another error"),
     ],
 )
 def test_a_signal_before_anything_is_there_says_so(tmp_path, body, by):
