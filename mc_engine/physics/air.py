@@ -8,8 +8,8 @@ import math
 from collections import namedtuple
 from itertools import pairwise
 
-from mc_engine.lanes import exp, minimum, physics, sqrt, where
-from mc_engine.physics.atmosphere import US76_TOP, us76_logarithm
+from mc_engine.lanes import exp, maximum, minimum, physics, sqrt, where
+from mc_engine.physics.atmosphere import US76_TOP, VACUUM, us76_logarithm
 
 Air = namedtuple("Air", "density pressure temperature speed_of_sound")  # kg/m^3, Pa, K, m/s
 
@@ -58,7 +58,9 @@ def us76_air(h):
         inside = h >= _BASE[i]
         a, c = where(inside, _A[i], a), where(inside, _C[i], c)
     density = exp(logarithm)
-    pressure = where(h >= US76_TOP, exp(minimum(a + c * h, 50.0)), density * (GAS_CONSTANT * temperature))
+    pressure = where(
+        h >= US76_TOP, exp(maximum(minimum(a + c * h, 50.0), VACUUM)), density * (GAS_CONSTANT * temperature)
+    )
     return Air(density, pressure, temperature, sqrt(HEAT_RATIO * GAS_CONSTANT * temperature))
 
 

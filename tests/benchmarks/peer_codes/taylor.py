@@ -9,10 +9,11 @@ from collections.abc import Callable
 import heyoka as hy
 import numpy as np
 
+from mc_engine.flight.kernel import registers
 from tests.benchmarks.peer_codes.entrant import TOLERANCES, Entrant, Flight, portions, shared
 from tests.benchmarks.peer_codes.problems import Problem
 
-WIDTH = hy.recommended_simd_size()
+WIDTH = max(hy.recommended_simd_size(), registers().doubles)  # heyoka recommends half a register of Intel's AVX-512
 
 
 def system(problem: Problem) -> tuple[list, object]:
