@@ -78,6 +78,7 @@ def faults(campaign: Campaign) -> list[str]:
             *_never_set(campaign, flown, nominal),
             *_always_the_same(campaign, flown),
             *_never_above(campaign, flown),
+            *_met_while_above(campaign, flown),
             *_moving_nothing(campaign, inputs, ids),
             *events_that_never_happen(campaign, inputs, ids, nominal),
         ]
@@ -255,6 +256,27 @@ def _never_above(campaign: Campaign, flown: Columns) -> Iterator[str]:
                 f'the metric "{metric.name}" is 0 in all of the {ok.sum()} cases that flew: none has "{output}" above '
                 f"the level of {level / factor:.6g} {unit}; `level` is in SI: multiply a level in {unit} by "
                 f"{factor:.6g}, or declare the metric with sometimes=True if it differs only with some settings"
+            )
+
+
+def _met_while_above(campaign: Campaign, flown: Columns) -> Iterator[str]:
+    """Requirements on a last time above a level which a flight that is above it until it ends met, or would meet where
+    all have the same length."""
+    ok = flown["status"] == STATUS_NAME[OK]
+    model = compiled_model(campaign.model)
+    lasts = {extremum.name for extremum in model.extrema if extremum.kind == "last_above"}
+    metrics = {metric.name: metric for metric in model.metrics if metric.symbol in lasts}
+    for requirement in campaign.requirements:
+        if requirement.metric not in metrics or requirement.at_most is None or not ok.any():
+            continue
+        factor = metrics[requirement.metric].si_factor
+        ends, last = flown[END_TIME][ok], flown[requirement.metric][ok] * factor
+        inside = ends <= requirement.at_most * factor
+        if (inside & (last >= ends)).any() or (inside.all() and np.ptp(ends) == 0.0):
+            yield (
+                f'requirement "{requirement.name}" is met by a flight that is above the level of '
+                f'"{requirement.metric}" until it ends, because the metric is then the time of the end, such as '
+                f"{ends[inside].max():.6g} s; choose at_most below it, or fly longer"
             )
 
 

@@ -11,7 +11,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from mc_engine.lanes import minimum, physics, sin, sqrt, where
+from mc_engine.lanes import fma, minimum, physics, sin, sqrt, where
 from mc_engine.model import Field, FixedStep, Parameter, Setting, at_end, inputs, metrics, model, outputs, states
 
 COUPLING = ((7.0, -1.2, 1.1, 1.2), (1.2, 0.9, 2.5, -2.6), (2.2, -1.7, -0.8, -1.1))  # kg^(1/2) m
@@ -58,16 +58,29 @@ def initial():
     )  # fmt: skip
 
 
+# products and sums are fused as a compiler fuses them with -ffast-math: the C++ that this model is measured against
+
+
+@physics
+def _along(c, x1, x2, x3, x4):
+    return fma(c[0], x1, fma(c[1], x2, fma(c[2], x3, c[3] * x4)))
+
+
+@physics
+def _dot(ax, ay, az, bx, by, bz):
+    return fma(ax, bx, fma(ay, by, az * bz))
+
+
 @physics
 def _torque(s):
     """Control torque [N m], eqs (11), (13)-(16), its size limited."""
-    fast = s.wx * s.wx + s.wy * s.wy + s.wz * s.wz >= LARGEST_RATE * LARGEST_RATE
+    fast = _dot(s.wx, s.wy, s.wz, s.wx, s.wy, s.wz) >= LARGEST_RATE * LARGEST_RATE
     kd, kp = where(fast, DELTA_D * KD, KD), where(fast, KP / DELTA_P, KP)
     ki = where(fast, KI / DELTA_I, KI)
-    x = -kd * s.wx - kp * s.q1 - ki * (s.nx - GAMMA * (s.q1 - FIRST_QUATERNION[1]))
-    y = -kd * s.wy - kp * s.q2 - ki * (s.ny - GAMMA * (s.q2 - FIRST_QUATERNION[2]))
-    z = -kd * s.wz - kp * s.q3 - ki * (s.nz - GAMMA * (s.q3 - FIRST_QUATERNION[3]))
-    size = sqrt(x * x + y * y + z * z + 1e-300)
+    x = -fma(kd, s.wx, fma(kp, s.q1, ki * fma(-GAMMA, s.q1 - FIRST_QUATERNION[1], s.nx)))
+    y = -fma(kd, s.wy, fma(kp, s.q2, ki * fma(-GAMMA, s.q2 - FIRST_QUATERNION[2], s.ny)))
+    z = -fma(kd, s.wz, fma(kp, s.q3, ki * fma(-GAMMA, s.q3 - FIRST_QUATERNION[3], s.nz)))
+    size = sqrt(_dot(x, y, z, x, y, z) + 1e-300)
     share = minimum(1.0, LARGEST_TORQUE / size)
     return share * x, share * y, share * z
 
@@ -78,42 +91,42 @@ def rhs(t, s, p):
     ux, uy, uz = _torque(s)
     td = DISTURBANCE * (sin(t) + p.offset)
     c1, c2, c3 = COUPLING
-    hx = p.jx * s.wx + (c1[0] * s.b1 + c1[1] * s.b2 + c1[2] * s.b3 + c1[3] * s.b4)
-    hy = p.jy * s.wy + (c2[0] * s.b1 + c2[1] * s.b2 + c2[2] * s.b3 + c2[3] * s.b4)
-    hz = p.jz * s.wz + (c3[0] * s.b1 + c3[1] * s.b2 + c3[2] * s.b3 + c3[3] * s.b4)
-    e1 = 2.0 * DAMPING[0] * FREQUENCY[0] * s.b1 + FREQUENCY[0] * FREQUENCY[0] * s.a1
-    e2 = 2.0 * DAMPING[1] * FREQUENCY[1] * s.b2 + FREQUENCY[1] * FREQUENCY[1] * s.a2
-    e3 = 2.0 * DAMPING[2] * FREQUENCY[2] * s.b3 + FREQUENCY[2] * FREQUENCY[2] * s.a3
-    e4 = 2.0 * DAMPING[3] * FREQUENCY[3] * s.b4 + FREQUENCY[3] * FREQUENCY[3] * s.a4
-    tx = s.wz * hy - s.wy * hz + ux + td + (c1[0] * e1 + c1[1] * e2 + c1[2] * e3 + c1[3] * e4)
-    ty = s.wx * hz - s.wz * hx + uy + td + (c2[0] * e1 + c2[1] * e2 + c2[2] * e3 + c2[3] * e4)
-    tz = s.wy * hx - s.wx * hy + uz + td + (c3[0] * e1 + c3[1] * e2 + c3[2] * e3 + c3[3] * e4)
-    dx = p.ixx * tx + p.ixy * ty + p.ixz * tz
-    dy = p.ixy * tx + p.iyy * ty + p.iyz * tz
-    dz = p.ixz * tx + p.iyz * ty + p.izz * tz
+    hx = fma(p.jx, s.wx, _along(c1, s.b1, s.b2, s.b3, s.b4))
+    hy = fma(p.jy, s.wy, _along(c2, s.b1, s.b2, s.b3, s.b4))
+    hz = fma(p.jz, s.wz, _along(c3, s.b1, s.b2, s.b3, s.b4))
+    e1 = fma(2.0 * DAMPING[0] * FREQUENCY[0], s.b1, FREQUENCY[0] * FREQUENCY[0] * s.a1)
+    e2 = fma(2.0 * DAMPING[1] * FREQUENCY[1], s.b2, FREQUENCY[1] * FREQUENCY[1] * s.a2)
+    e3 = fma(2.0 * DAMPING[2] * FREQUENCY[2], s.b3, FREQUENCY[2] * FREQUENCY[2] * s.a3)
+    e4 = fma(2.0 * DAMPING[3] * FREQUENCY[3], s.b4, FREQUENCY[3] * FREQUENCY[3] * s.a4)
+    tx = fma(s.wz, hy, fma(-s.wy, hz, ux + td + _along(c1, e1, e2, e3, e4)))
+    ty = fma(s.wx, hz, fma(-s.wz, hx, uy + td + _along(c2, e1, e2, e3, e4)))
+    tz = fma(s.wy, hx, fma(-s.wx, hy, uz + td + _along(c3, e1, e2, e3, e4)))
+    dx = _dot(p.ixx, p.ixy, p.ixz, tx, ty, tz)
+    dy = _dot(p.ixy, p.iyy, p.iyz, tx, ty, tz)
+    dz = _dot(p.ixz, p.iyz, p.izz, tx, ty, tz)
     # rate relative to the orbital frame, eqs (7)-(9)
-    rx = s.wx + ORBITAL_RATE * (2.0 * (s.q1 * s.q2 + s.q0 * s.q3))
-    ry = s.wy + ORBITAL_RATE * (s.q0 * s.q0 - s.q1 * s.q1 + s.q2 * s.q2 - s.q3 * s.q3)
-    rz = s.wz + ORBITAL_RATE * (2.0 * (s.q2 * s.q3 - s.q0 * s.q1))
+    rx = fma(2.0 * ORBITAL_RATE, fma(s.q1, s.q2, s.q0 * s.q3), s.wx)
+    ry = fma(ORBITAL_RATE, fma(s.q0, s.q0, fma(-s.q1, s.q1, fma(s.q2, s.q2, -(s.q3 * s.q3)))), s.wy)
+    rz = fma(2.0 * ORBITAL_RATE, fma(s.q2, s.q3, -(s.q0 * s.q1)), s.wz)
     return State(
         wx=dx,
         wy=dy,
         wz=dz,
-        q0=-0.5 * (s.q1 * rx + s.q2 * ry + s.q3 * rz),
-        q1=0.5 * (s.q0 * rx + s.q2 * rz - s.q3 * ry),
-        q2=0.5 * (s.q0 * ry + s.q3 * rx - s.q1 * rz),
-        q3=0.5 * (s.q0 * rz + s.q1 * ry - s.q2 * rx),
+        q0=-0.5 * _dot(s.q1, s.q2, s.q3, rx, ry, rz),
+        q1=0.5 * _dot(s.q0, s.q2, -s.q3, rx, rz, ry),
+        q2=0.5 * _dot(s.q0, s.q3, -s.q1, ry, rx, rz),
+        q3=0.5 * _dot(s.q0, s.q1, -s.q2, rz, ry, rx),
         a1=s.b1,
         a2=s.b2,
         a3=s.b3,
         a4=s.b4,
-        b1=-e1 - (c1[0] * dx + c2[0] * dy + c3[0] * dz),
-        b2=-e2 - (c1[1] * dx + c2[1] * dy + c3[1] * dz),
-        b3=-e3 - (c1[2] * dx + c2[2] * dy + c3[2] * dz),
-        b4=-e4 - (c1[3] * dx + c2[3] * dy + c3[3] * dz),
-        nx=C1 * s.wx + C2 * s.q1,
-        ny=C1 * s.wy + C2 * s.q2,
-        nz=C1 * s.wz + C2 * s.q3,
+        b1=-e1 - _dot(c1[0], c2[0], c3[0], dx, dy, dz),
+        b2=-e2 - _dot(c1[1], c2[1], c3[1], dx, dy, dz),
+        b3=-e3 - _dot(c1[2], c2[2], c3[2], dx, dy, dz),
+        b4=-e4 - _dot(c1[3], c2[3], c3[3], dx, dy, dz),
+        nx=fma(C1, s.wx, C2 * s.q1),
+        ny=fma(C1, s.wy, C2 * s.q2),
+        nz=fma(C1, s.wz, C2 * s.q3),
     )
 
 

@@ -72,6 +72,7 @@ FLOWN = {
         "when it flies among other cases",
     ),
 }
+TOP_SPEED = 'top_speed_m_s=maximum_of("speed_m_s", "largest speed")'
 
 
 def test_events_may_share_a_function_that_gives_one_number(tmp_path):
@@ -91,10 +92,9 @@ def test_a_mistake_that_shows_in_flight_is_one_sentence(mistake, tmp_path):
 
 
 def test_metrics_that_are_never_set_infinite_or_constant_are_named_one_by_one(tmp_path):
-    metric = 'top_speed_m_s=maximum_of("speed_m_s", "largest speed")'
     campaign = campaign_with(
         tmp_path,
-        (metric, f'{metric}, lost_m_s="lost", endless_m_s="endless", idle_m_s="idle"'),
+        (TOP_SPEED, f'{TOP_SPEED}, lost_m_s="lost", endless_m_s="endless", idle_m_s="idle"'),
         in_front(
             "@physics\ndef evaluate(best):\n"
             "    return Metrics(lost=best.top_speed / 0.0 * 0.0, endless=best.top_speed / 0.0, idle=7.5)"
@@ -115,10 +115,10 @@ def test_metrics_that_are_never_set_infinite_or_constant_are_named_one_by_one(tm
 def test_a_level_that_no_output_exceeds_is_told_where_it_may_be_in_the_small_unit_of_the_output(
     unit, options, found, tmp_path
 ):
-    metric, renamed = 'top_speed_m_s=maximum_of("speed_m_s", "largest speed")', f'altitude_{unit}="altitude"'
+    renamed = f'altitude_{unit}="altitude"'
     campaign = campaign_with(
         tmp_path,
-        (metric, f'{metric}, high_s=last_above("altitude_{unit}", 1e9, "last time above"{options})'),
+        (TOP_SPEED, f'{TOP_SPEED}, high_s=last_above("altitude_{unit}", 1e9, "last time above"{options})'),
         ("inputs, maximum_of", "inputs, last_above, maximum_of"),
         ('altitude_km="altitude"', renamed),
         ('apogee_altitude_km=at_end("altitude_km"', f'apogee_altitude_km=at_end("altitude_{unit}"'),
@@ -133,6 +133,22 @@ def test_a_level_that_no_output_exceeds_is_told_where_it_may_be_in_the_small_uni
 
 CLOCK = "FixedStep(step=10.0, until=10_000.0)"
 STOP = 'events={"apogee": Event(climb, "falling", "stop")}'
+
+
+@pytest.mark.parametrize(
+    ("level", "events", "limit", "found"),
+    [("7e3", STOP, 3000.0, 1), ("7e3", STOP, 500.0, 0), ("7.6e3", STOP, 2900.0, 0), ("9e3", "events={}", 1e4, 1)],
+)
+def test_a_limit_on_a_settling_time_that_flights_without_one_meet_is_told(level, events, limit, found, tmp_path):
+    campaign = campaign_with(
+        tmp_path,
+        (TOP_SPEED, f'{TOP_SPEED}, calm_s=last_above("speed_m_s", {level}, "last time above", sometimes=True)'),
+        ("inputs, maximum_of", "inputs, last_above, maximum_of"),
+        (STOP, events),
+    )
+    requirements = (replace(campaign.requirements[0], name="calm", metric="calm_s", at_least=None, at_most=limit),)
+    told = faults(replace(campaign, requirements=requirements))
+    assert ["is met by a flight that is above the level of" in one for one in told] == [True] * found
 
 
 @pytest.mark.parametrize(
