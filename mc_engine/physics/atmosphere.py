@@ -43,7 +43,7 @@ _SCALE = tuple(layer[2] for layer in LAYERS)
 
 @physics
 def exponential(h, rho_ref, h_ref, scale_height):
-    """Density [kg/m^3] at altitude h [m]: rho_ref exp(-(h - h_ref) / scale_height).
+    """Density [kg/m^3] at altitude h [m]: rho_ref exp(-(h - h_ref) / scale_height), at least rho_ref exp(-600).
 
     Vallado, Fundamentals of Astrodynamics and Applications, 4th ed., eq. (8-33).
     """
@@ -137,8 +137,9 @@ def us76_logarithm(h):
 
     U.S. Standard Atmosphere, 1976, eqs (18), (23), (33a), (33b): exact to 86 km.  Above, its tabulated densities with
     linear interpolation of the logarithm: up to 8 % too high to 150 km, up to 15 % to 200 km.  Beyond, it is
-    extrapolated: a fifth of the standard's density at 300 km, a fiftieth at 400 km; use `layered` there.  Above 86 km
-    the temperature is constant, fit only for a Mach number.  Below the ground the lowest layer is extended.
+    extrapolated, to ln rho = -600: a fifth of the standard's density at 300 km, a fiftieth at 400 km; use `layered`
+    there.  Above 86 km the temperature is constant, fit only for a Mach number.  Below the ground the lowest layer is
+    extended.
     """
     # both sides of 86 km are computed, so the altitude of each stays within its own
     low = minimum(h, US76_TOP)
