@@ -94,12 +94,13 @@ def taken(time: np.ndarray, values: np.ndarray, what: str, level: float) -> floa
     """What is taken of the history of a variable.
 
     what : "final", "max", "min", "time_of_max", or "crossing": the first time at which the variable reaches the level
-    or passes it, linear between two rows; NaN if it never does.
+    or passes it, linear between two rows; NaN if it never does.  Extremes and their times are NaN if a value is NaN.
     """
     if what == "final":
         return float(values[-1])
     if what == "time_of_max":
-        return float(time[np.argmax(values)])
+        largest = np.argmax(values)  # of the first NaN, if there is one
+        return float("nan") if np.isnan(values[largest]) else float(time[largest])
     if what != "crossing":
         return float(values.max() if what == "max" else values.min())
     side = np.sign(values - level)

@@ -159,3 +159,11 @@ def test_what_is_taken_of_a_history():
     assert taken(time, values, "crossing", 2.0) == 1.0  # reached
     assert taken(time, values, "crossing", 4.0) == pytest.approx(np.nan, nan_ok=True)  # left, and not reached again
     assert taken(time, values, "crossing", 3.0) == 0.5
+
+
+@pytest.mark.parametrize("what", ["max", "min", "time_of_max", "crossing"])
+@pytest.mark.parametrize("lost", [0, 2, 3])
+def test_nothing_is_taken_of_a_history_with_a_value_that_is_no_number(what, lost):
+    time, values = np.array([0.0, 1.0, 2.0, 3.0]), np.array([4.0, 5.0, 2.0, 1.0])
+    values[lost] = np.nan
+    assert np.isnan(taken(time, values, what, 0.5))
