@@ -62,7 +62,7 @@ Bracket = namedtuple("Bracket", "low high at_low at_high rate_low rate_high side
 _BROKEN, _CAPPED, _UNSTOPPED = float(NOT_FINITE), float(STEP_LIMIT), float(NO_STOP)
 _REACH = 1e-5  # of a step: length of the tangent over which rates are taken
 _FEW = 3.0  # looks at an event with its width; then the width grows
-_CHORDS = 8.0  # then every other look halves the bracket, so that none stalls
+_CHORDS = 8.0  # then every other look halves the bracket, and the width stays: else it would be met far from the zero
 _CLOSED = 2e-15  # of time and length: the width at which the bracket of an event is closed
 _CREST = 1e-7  # of a step: the same for a peak, which is flat and differs by the square of this
 _AT_SAMPLE = 1e-12  # of the time: an event at a sample may be found so far behind it
@@ -137,7 +137,7 @@ def _narrow(kinds, signs, bracket, seen, rates, looking):
     side = where(back, 1.0, where(ahead, -1.0, bracket.side))
     low, high = where(ahead, bracket.look, bracket.low), where(back, bracket.look, bracket.high)
     # many looks: the rounding of the sense is in the way
-    width = where(bracket.looks > _FEW, 2.0, 1.0) * bracket.width
+    width = where((bracket.looks > _FEW) & (bracket.looks < _CHORDS), 2.0, 1.0) * bracket.width
     roots = map_fields(_root, kinds, at_low, at_high, rate_low, rate_high, signs, low, high)
     near = least(map_fields(_near, kinds, roots, at_low, at_high, rate_high, signs, high, width)) >= 0.0
     look = minimum(maximum(least(roots), low) + 0.5 * width, high - 0.4 * width)

@@ -181,6 +181,18 @@ def test_a_falling_crossing_is_met_in_a_step_that_also_rises_over_the_level_and_
         assert columns[name] == pytest.approx(times, abs=1e-8)
 
 
+def test_a_visit_of_a_millisecond_has_the_times_of_its_parabola_and_its_top():
+    """Closed form of a throw that rises a little over a ceiling; after the switch there, its steps take seconds."""
+    excess = np.array([1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 0.1])
+    columns = flown(load_model("grazed_ceiling.py", FOLDER), excess_m=excess)
+    top = np.sqrt(2.0 * (100.0 + excess) / 9.8)
+    half = np.sqrt(2.0 * excess / 9.8)
+    assert columns["rise_s"] == pytest.approx(top - half, abs=1e-9)
+    assert columns["fall_s"] == pytest.approx(top + half, abs=1e-9)
+    assert columns["top_s"] == pytest.approx(top, abs=1e-9)
+    assert columns["top_m"] - 100.0 == pytest.approx(excess, abs=1e-12)
+
+
 def test_the_time_of_a_largest_value_that_jumps_there_is_that_of_the_jump():
     opening = np.linspace(4.0, 6.0, 20)
     columns = flown(load_model("opened_parachute.py", FOLDER), open_s=opening)
