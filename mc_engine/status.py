@@ -33,7 +33,7 @@ STATUS_NAME = {
 
 STATUS_TEXT = {
     OK: "completed",
-    NOT_FINITE: "a state, event or simulator's metric is infinite or not a number; the row holds the last finite state",
+    NOT_FINITE: "a state, event or simulator's metric is infinite or not a number; the last finite state is kept",
     STEP_LIMIT: "the cap on integration steps was reached",
     EVENT_LIMIT: "more events in one step than the engine follows; the control chatters",
     NO_STOP: "the flight reached its time limit before the event that should end it",

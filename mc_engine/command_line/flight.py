@@ -243,7 +243,7 @@ def finish(
     failed = failed_cases(counts)
     if failed == sum(counts.values()):
         named = shell_word(campaign or store.path / "campaign.toml")
-        look = f"`mc-engine check {named}` looks for the reason in the model"
+        look = f"`mc-engine check {named}` looks for the reason"
         why = "the column `reason` of its cases says why" if store.manifest.get("imported") else look
         typer.echo(f"no case completed; {why}", err=True)
     elif line := failure_line(store):

@@ -179,7 +179,8 @@ class Event:
     In a model with a stopping event, a case that reaches the integrator's `until` first ends with status no-stop and
     counts as failed.  If a case may also end regularly at a time limit, declare an event t - limit before `until`.
 
-    function : physics that takes any of t, s, m, p, o by name; returns the number whose zero crossing is the event
+    function : physics that takes any of t, s, m, p, o by name; returns the number whose zero crossing is the event.
+        Crossings that follow each other within one step are missed; of an adaptive step two are found.
     direction : str, "rising", "falling" or "either"
     action : str, "stop" ends the case, "switch" calls the model's `switch`; by default "stop", and "switch" with `to`
     to : str, the phase that begins, see `Phase`; `switch` may change state and discrete state there, too
