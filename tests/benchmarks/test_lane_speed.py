@@ -24,9 +24,10 @@ def least_ratio():
     """What the processor allows: eight doubles of AVX-512, which Zen 4 computes in two halves, or four of AVX2."""
     features = binding.get_host_cpu_features()
     if features.get("avx512f"):
-        # Zen 4, quiet: 5.1 to 7.1, the flexible satellite 4.4.  Work on the core's other thread takes more from eight
-        # lanes, which fill the core, than from one.
-        return 3.5 if binding.get_host_cpu_name() == "znver4" else 7.0
+        # Zen 4, quiet: 5.1 to 7.1, the flexible satellite 4.4.  Emerald Rapids, quiet: 5.3 to 6.0, because Intel's take
+        # roots and quotients of eight numbers in four times the time of one.  Work on the core's other thread takes
+        # more from eight lanes, which fill the core, than from one.
+        return {"znver5": 7.0, "znver4": 3.5}.get(binding.get_host_cpu_name(), 4.0)
     if features.get("avx2"):
         return 3.0  # Zen 3, quiet: 3.7 to 4.2
     return None
