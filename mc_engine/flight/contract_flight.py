@@ -240,16 +240,22 @@ def _always_the_same(campaign: Campaign, flown: Columns) -> Iterator[str]:
             )
 
 
+def _last_times(model: Model) -> Iterator[tuple[Any, Any]]:
+    """(metric, extremum) of each last time above a level."""
+    for extremum in model.extrema:
+        if extremum.kind == "last_above":
+            yield from ((metric, extremum) for metric in model.metrics if metric.symbol == extremum.name)
+
+
 def _never_above(campaign: Campaign, flown: Columns) -> Iterator[str]:
     """Last times above a level that no case exceeds, of outputs in a unit below SI's, such as deg: a level in deg is
     too high then.  One in km, taken for m, would be too low; no case above it is as it should be."""
     ok = flown["status"] == STATUS_NAME[OK]
     model = compiled_model(campaign.model)
-    extrema = {extremum.name: extremum for extremum in model.extrema if extremum.kind == "last_above"}
-    for metric in model.metrics:
-        if metric.symbol not in extrema or metric.sometimes or flown[metric.name][ok].any():
+    for metric, extremum in _last_times(model):
+        if metric.sometimes or flown[metric.name][ok].any():
             continue
-        level, output = extrema[metric.symbol].level, extrema[metric.symbol].quantity
+        level, output = extremum.level, extremum.quantity
         unit, factor = next((q.unit, q.si_factor) for q in model.quantities if q.name == output)
         if factor < 1.0:
             yield (
@@ -263,13 +269,11 @@ def _met_while_above(campaign: Campaign, flown: Columns) -> Iterator[str]:
     """Requirements on a last time above a level which a flight that is above it until it ends met, or would meet where
     all have the same length."""
     ok = flown["status"] == STATUS_NAME[OK]
-    model = compiled_model(campaign.model)
-    lasts = {extremum.name for extremum in model.extrema if extremum.kind == "last_above"}
-    metrics = {metric.name: metric for metric in model.metrics if metric.symbol in lasts}
+    factors = {metric.name: metric.si_factor for metric, _ in _last_times(compiled_model(campaign.model))}
     for requirement in campaign.requirements:
-        if requirement.metric not in metrics or requirement.at_most is None or not ok.any():
+        if requirement.metric not in factors or requirement.at_most is None or not ok.any():
             continue
-        factor = metrics[requirement.metric].si_factor
+        factor = factors[requirement.metric]
         ends, last = flown[END_TIME][ok], flown[requirement.metric][ok] * factor
         inside = ends <= requirement.at_most * factor
         if (inside & (last >= ends)).any() or (inside.all() and np.ptp(ends) == 0.0):

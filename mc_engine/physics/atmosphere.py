@@ -174,4 +174,4 @@ def us76_of_array(h: np.ndarray) -> np.ndarray:
     t0, lapse, a, b, c = np.array(_LAYERS)[np.maximum(np.searchsorted(_BASE, x, "right") - 1, 0), 1:].T
     _, aloft_a, aloft_c = np.array(_ALOFT)[np.maximum(np.searchsorted(_ALOFT_BASE, h, "right") - 1, 0)].T
     below = a.T + b.T * np.log(t0.T + lapse.T * x) + c.T * x
-    return np.exp(np.where(np.asarray(h) >= US76_TOP, aloft_a.T + aloft_c.T * h, below))
+    return np.exp(np.where(np.asarray(h) >= US76_TOP, np.maximum(aloft_a.T + aloft_c.T * h, VACUUM), below))

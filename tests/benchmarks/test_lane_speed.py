@@ -27,7 +27,8 @@ def least_ratio():
         # Zen 4, quiet: 5.1 to 7.1, the flexible satellite 4.4.  Emerald Rapids, quiet: 5.3 to 6.0, because Intel's take
         # roots and quotients of eight numbers in four times the time of one.  Work on the core's other thread takes
         # more from eight lanes, which fill the core, than from one.
-        return {"znver5": 7.0, "znver4": 3.5}.get(binding.get_host_cpu_name(), 4.0)
+        name = binding.get_host_cpu_name()
+        return 3.5 if name == "znver4" else 7.0 if name.startswith("znver") else 4.5
     if features.get("avx2"):
         return 3.0  # Zen 3, quiet: 3.7 to 4.2
     return None
