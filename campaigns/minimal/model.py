@@ -1,6 +1,6 @@
 """An apogee raised by one burn, an impulse at the perigee of a circular orbit: a start for a model of your own."""
 
-from mc_engine.lanes import cos, physics, sin, sqrt
+from mc_engine.lanes import cos, physics, rsqrt, sin, sqrt
 from mc_engine.model import Event, FixedStep, Parameter, at_end, inputs, maximum_of, metrics, model, outputs, states
 from mc_engine.physics.constants import EQUATORIAL_RADIUS, MU_EARTH
 
@@ -26,7 +26,7 @@ def initial(p):  # just after the burn, on the x axis; a function takes what it 
 @physics
 def rhs(s):  # derivative of the state: a point mass attracts, mu / r^2 [m/s^2]
     r2 = s.x * s.x + s.y * s.y
-    g = -MU_EARTH / (r2 * sqrt(r2))
+    g = -MU_EARTH * rsqrt(r2) ** 3
     return State(x=s.vx, y=s.vy, vx=g * s.x, vy=g * s.y)
 
 

@@ -1,6 +1,6 @@
 """The lane engine: physics written once on plain numbers, compiled for one case and for vectors of cases."""
 
-from mc_engine.lanes.elementary import acos, asin, atan, atan2, cos, exp, log, pow, sin, sincos, tan
+from mc_engine.lanes.elementary import acos, asin, atan, atan2, cos, exp, log, pow, rsqrt, sin, sincos, tan
 from mc_engine.lanes.functions import (
     any_lane,
     copysign,
@@ -39,6 +39,7 @@ __all__ = [
     "pow",
     "replace",
     "rint",
+    "rsqrt",
     "sin",
     "sincos",
     "sqrt",

@@ -132,6 +132,11 @@ def _mantissa(builder, width, args):
     return builder.bitcast(builder.or_(fraction, constant(width, 1023 << 52, I64)), llvm_type(width))
 
 
+def _inverse_root_guess(builder, width, args):
+    half = builder.lshr(builder.bitcast(args[0], llvm_type(width, I64)), constant(width, 1, I64))
+    return builder.bitcast(builder.sub(constant(width, functions.INVERSE_ROOT_BITS, I64), half), llvm_type(width))
+
+
 fused = _intrinsic("fma")  # x y + z, rounded once: the same at every width, because it is asked for
 
 _register(functions.sqrt, 1, _intrinsic("sqrt"))
@@ -146,6 +151,7 @@ _register(functions.where, 2, _choose, mask_first=True)
 _register(functions.two_to, 1, _two_to)
 _register(functions.exponent, 1, _exponent)
 _register(functions.mantissa, 1, _mantissa)
+_register(functions.inverse_root_guess, 1, _inverse_root_guess)
 
 
 @infer_global(functions.look_up)

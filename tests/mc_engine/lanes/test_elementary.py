@@ -10,7 +10,7 @@ from compiled_physics import bits, by_every_width
 from mc_engine import lanes
 from mc_engine.lanes import physics
 
-ONE_ARGUMENT = ("exp", "sin", "cos", "tan", "asin", "acos", "atan", "log")
+ONE_ARGUMENT = ("exp", "sin", "cos", "tan", "asin", "acos", "atan", "log", "rsqrt")
 TWO_ARGUMENTS = ("atan2", "pow")
 NAMES = (*ONE_ARGUMENT, *TWO_ARGUMENTS)
 INF, NAN = math.inf, math.nan
@@ -28,6 +28,7 @@ def _all(x, y):
         lanes.acos(x),
         lanes.atan(x),
         lanes.log(x),
+        lanes.rsqrt(x),
         lanes.atan2(x, y),
         lanes.pow(x, y),
         s,
@@ -52,7 +53,8 @@ def error_in_ulp(name, x, y=None):
     """Largest error over the points, in units of the last place of the true value (2**-1074 at least)."""
     x = np.asarray(x, dtype=float)
     y = np.ones_like(x) if y is None else np.asarray(y, dtype=float)
-    exact = {"pow": mpmath.power, "atan2": mpmath.atan2}.get(name) or getattr(mpmath, name)
+    others = {"pow": mpmath.power, "atan2": mpmath.atan2, "rsqrt": lambda x: 1 / mpmath.sqrt(x)}
+    exact = others.get(name) or getattr(mpmath, name)
     worst = 0.0
     with mpmath.workprec(140):
         for a, b, value in zip(x.tolist(), y.tolist(), compiled(name, x, y).tolist(), strict=True):
@@ -157,6 +159,11 @@ def test_log_errs_by_at_most_one_ulp(x):
     assert error_in_ulp("log", x) <= 1.0
 
 
+@pytest.mark.parametrize("x", [powers_of_ten(-307, 308), spread_out(1.0, 4.0)], ids=["all", "two octaves"])
+def test_rsqrt_errs_by_at_most_one_ulp(x):
+    assert error_in_ulp("rsqrt", x) <= 1.0
+
+
 @pytest.mark.parametrize(
     ("x", "y"),
     [
@@ -180,11 +187,12 @@ SPECIAL = {
     "acos": [(0.0, math.pi / 2), (-0.0, math.pi / 2), (1.0, 0.0), (-1.0, math.pi), (-1 - 2**-52, NAN), (1e300, NAN)],
     "atan": [(0.0, 0.0), (-0.0, -0.0), (INF, math.pi / 2), (-INF, -math.pi / 2), (1e300, math.pi / 2)],
     "log": [(0.0, -INF), (-0.0, -INF), (1.0, 0.0), (INF, INF), (-INF, NAN), (-1.0, NAN), (-5e-324, NAN)],
+    "rsqrt": [(0.0, INF), (-0.0, INF), (2e-308, INF), (1.0, 1.0), (INF, 0.0), (-INF, NAN), (-1.0, NAN), (-2e-308, NAN)],
 }
 
 
 @pytest.mark.parametrize("name", ONE_ARGUMENT)
-def test_zeros_infinities_and_numbers_out_of_the_domain_are_as_in_c99_but_for_the_sign_of_a_zero_angle(name):
+def test_zeros_infinities_and_numbers_out_of_the_domain_are_as_in_c99_but_for_signs_at_zero(name):
     x, expected = zip(*SPECIAL[name], (NAN, NAN), strict=True)
     np.testing.assert_array_equal(bits(compiled(name, x)), bits(expected))
     np.testing.assert_array_equal(bits(interpreted(name, x, x)), bits(expected))

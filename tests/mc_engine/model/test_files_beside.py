@@ -18,7 +18,7 @@ from tests.mc_engine.store.small_run import ENVIRONMENT
 
 MODEL = (SHIPPED / "minimal" / "model.py").read_text()
 CAMPAIGN = (SHIPPED / "minimal" / "campaign.toml").read_text()
-PULL = "g = -MU_EARTH / (r2 * sqrt(r2))"
+PULL = "g = -MU_EARTH * rsqrt(r2) ** 3"
 DYNAMICS = """from {constants} import MU
 from mc_engine.lanes import physics, sqrt
 

@@ -15,7 +15,7 @@ from mc_engine.model.faults import MORE
 from mc_engine.runner.runner import run
 from tests.mc_engine.told import told
 
-ACCELERATION = "    g = -MU_EARTH / (r2 * sqrt(r2))\n"
+ACCELERATION = "    g = -MU_EARTH * rsqrt(r2) ** 3\n"
 DERIVATIVE = "    return State(x=s.vx, y=s.vy, vx=g * s.x, vy=g * s.y)"
 EVENT = "    return s.x * s.vx + s.y * s.vy"
 END = "speed=sqrt(s.vx * s.vx + s.vy * s.vy))"  # of `observe`
@@ -23,7 +23,7 @@ SIGNATURE = ("def rhs(s)", "def rhs(t, s, m, p, o)")
 IMPORTS = "from mc_engine.lanes import"
 RHS = "@physics\ndef rhs"
 CLOCK = "FixedStep(step=10.0, until=10_000.0)"
-LANES = ("cos, physics, sin, sqrt", "any_lane, cos, physics, sin, sqrt, where")
+LANES = ("cos, physics, rsqrt, sin, sqrt", "any_lane, cos, physics, rsqrt, sin, sqrt, where")
 HERE = "  # here"  # ends the line that the sentence must name; the first one of `rhs` without
 
 

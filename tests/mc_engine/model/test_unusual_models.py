@@ -8,7 +8,7 @@ from mc_engine.flight.contract_flight import faults
 
 IMPORTS = "from mc_engine.lanes import"
 RHS = "@physics\ndef rhs"
-ACCELERATION = "    g = -MU_EARTH / (r2 * sqrt(r2))\n"
+ACCELERATION = "    g = -MU_EARTH * rsqrt(r2) ** 3\n"
 WHERE = ("sin, sqrt", "maximum, sin, sqrt, where")
 SIGNATURE = ("def rhs(s)", "def rhs(t, s, m, p, o)")
 
