@@ -50,6 +50,8 @@ class _Commands(TyperGroup):
 def _converted(kind: Any, value: Any, param: Any, ctx: Any) -> Any:
     whole = kind.name.startswith("int")
     if isinstance(value, str) and not (is_whole(value) if whole else is_real(value) and isfinite(float(value))):
+        if value.startswith("--"):  # an unknown option where a command takes numbers below zero
+            kind.fail(f"{value!a} is no option of this command; give the number alone", param, ctx)
         most = f" in digits alone, such as 10000, of at most {LARGEST_WHOLE}" if whole else ", such as 0.5 or 1e-3"
         kind.fail(f"{value!a} is not a {'whole ' if whole else ''}number{most}", param, ctx)
     return kind.convert(value, param, ctx)

@@ -57,6 +57,7 @@ def test_a_slip_is_answered_with_what_is_there_or_the_next_command(here):
         (["tune", "cart"], "write [tuning.parameter.NAME] and [tuning.objective.NAME], as flexible_satellite/stage_1"),
         (["rare", "cart"], 'there are several; choose one of "reach", "stop", on the command line by `--requirement`'),
         (["replay", "runs/a", "-1"], "Invalid value for 'CASE'"),
+        (["replay", "runs/a", "--case", "3"], "'--case' is no option of this command; give the number alone"),
         (["plan", "--share", "2", "--confidence", "0.9"], "--share is 2; it must be above 0 and below 1"),
     ]:
         fails_with(2, call(*words), said)
