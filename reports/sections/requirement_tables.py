@@ -88,6 +88,11 @@ def requirement_table(flown: Flown) -> Table:
             " It passes where that is demonstrated and every requirement passes, and fails where one of them fails "
             "with confidence shared (next table)."
         ) * flown.random
+    elif len(rows) > 1:
+        note += (
+            " There is no verdict on all at once: what the requirements may miss adds up to 100 % or more, so that no "
+            "probability of meeting all of them follows."
+        )
     kept = [tuple(cell for cell, column in zip(row, shown, strict=True) if column is not None) for row in rows]
     return Table("Verification matrix", columns, tuple(kept), note)
 

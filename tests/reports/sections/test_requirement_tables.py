@@ -48,6 +48,15 @@ def test_a_single_requirement_has_neither_a_joint_row_nor_a_shared_confidence():
     assert "Bonferroni" not in risk_table(one).note
 
 
+def test_requirements_that_may_all_be_missed_at_once_have_no_joint_row_and_the_note_says_why():
+    halves = [{**FUEL, "share": 0.5}, {**FORCE, "share": 0.5}]
+    table = requirement_table(flown(campaign=mc(), requirements=halves))
+    assert len(table.rows) == 2
+    assert "what the requirements may miss adds up to 100 % or more" in table.note
+    assert "adds up" not in requirement_table(flown(campaign=mc(), requirements=[FUEL])).note
+    assert "adds up" not in requirement_table(flown(campaign=mc())).note
+
+
 def test_risks_stand_beside_the_failures_seen_and_allowed():
     fuel, _, joint = texts(risk_table(flown(campaign=mc())))
     # 1000 cases, no failure allowed: 0.9973^1000 = 6.696 %, and 1 - 0.99865^1000 = 74.098 %, rounded up
