@@ -81,15 +81,19 @@ def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -
     tail = settings.tail_off * i.tail_off_factor
     late = (ignitions[1:] < ignitions[:-1] + durations[:-1] + tail).any(axis=0)
     refusals.add(late, "an ignition comes before the burn ahead of it has ended")
+    mass, flow = settings.initial_mass * i.initial_mass_factor, settings.mass_flow * i.thrust_factor / i.isp_factor
+    spent = flow * (durations.sum(axis=0) + 0.5 * tail * (durations > 0.0).sum(axis=0))
+    by_time = settings.shutdown == CHOICES.shutdown.time
+    refusals.add(by_time & (spent >= mass), "the burns would take more propellant than the whole craft weighs")
     rows = vars(i) | dict(zip(("x", "y", "z", "vx", "vy", "vz"), states, strict=True))
     for k in (1, 2, 3):
         rows[f"pitch_{k}"] = np.tan(i.pitch_error + rows[f"pitch_error_{k}"])
         rows[f"yaw_{k}"] = np.tan(i.yaw_error + rows[f"yaw_error_{k}"])
         rows[f"ignition_{k}"] = ignitions[k - 1] - i.ignition_delay_1  # after the first, as the kernel's clock
     return rows | {
-        "mass": settings.initial_mass * i.initial_mass_factor,
+        "mass": mass,
         "thrust": settings.thrust * i.thrust_factor,
-        "flow": settings.mass_flow * i.thrust_factor / i.isp_factor,
+        "flow": flow,
         "tail": tail,
     }
 

@@ -153,6 +153,14 @@ def test_an_ignition_inside_the_burn_before_it_is_refused_with_the_reason():
     assert "ignition comes before the burn ahead of it has ended" in row["reason"]
 
 
+def test_burns_that_take_more_than_the_whole_craft_are_refused_where_time_ends_them():
+    row = fly_one(isp_factor=0.7)
+    assert row["status"] == "refused"
+    assert "more propellant than the whole craft weighs" in row["reason"]
+    assert fly_one(isp_factor=0.8)["status"] == "ok"
+    assert fly_one(isp_factor=0.7, shutdown="sensed_velocity")["status"] == "ok"
+
+
 def test_a_tail_off_of_known_length_hardly_moves_the_orbit_and_costs_no_propellant():
     crisp, soft = fly_one(), fly_one(tail_off_s=2.0)
     assert soft["propellant_kg"] == pytest.approx(crisp["propellant_kg"], abs=1e-6)
