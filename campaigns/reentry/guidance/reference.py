@@ -240,6 +240,8 @@ def _path_and_gains(plan: Plan, path: Reference, weights: Weights):
     _, _, _, first, angle, _, along, _ = part.state
     gains = riccati_gains(first[0] - first, *linear_system(plan, part), weights).T
     felt = (path.state[LOST] > 0.0) & (path.t <= part.t[-1])
+    if felt.sum() < 2:
+        raise ModelError("on the planned entry the accelerometer along the axis feels no drag; check trim_angle_deg")
     _, _, _, speed, _, _, whole, lost = path.state
     over = [path.axial, np.log(path.axial), speed, np.gradient(whole, path.t), whole]
     # before the laws command, the gains are those of their first row

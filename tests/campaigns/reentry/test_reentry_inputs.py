@@ -141,6 +141,10 @@ REFUSED = [
         {"guidance": "law1", "plan_stop_altitude_km": 100.0},
         "the planned entry never has 0.15 g of drag, so that no law could steer",
     ),
+    (
+        {"guidance": "law1", "trim_angle_deg": -90.0},
+        "on the planned entry the accelerometer along the axis feels no drag; check trim_angle_deg",
+    ),
 ]
 
 
