@@ -158,7 +158,9 @@ MODEL = model(
     "satellite servicing system (in Russian), Candidate of Technical Sciences dissertation, Moscow Aviation Institute, "
     "Moscow, 2021",
     inputs=Inputs,
-    clock=AdaptiveStep("duration", "tolerance", dynamics.tolerances(1e-4, 1e-8), control_period=sample_period),
+    clock=AdaptiveStep(
+        "duration", "tolerance", dynamics.tolerances(1e-4, 1e-8), control_period=sample_period, attempts=1_000_000
+    ),
     kernel_parameters=Parameters,
     prepare=prepare,
     tables=tables,

@@ -128,6 +128,12 @@ def limits_of(o: Any) -> Limits:
     y, v, e = o.longitude_tolerance, TURN * o.period_tolerance / SIDEREAL_DAY, o.eccentricity_tolerance
     coasts = np.full(int(o.planned_corrections), o.least_coast / SIDEREAL_DAY)
     coasts[0] = o.first_coast / SIDEREAL_DAY
+    least = coasts.sum() * SIDEREAL_DAY
+    if o.longest_transfer < least:
+        raise ModelError(
+            f"the least coasts of {coasts.size} corrections take {least / 86_400.0:.2f} days: give more "
+            "longest_transfer_days, or less first_coast_h or least_coast_h"
+        )
     last = np.radians(drift_model.largest_last(np.degrees(y), np.degrees(v), e, max(o.assumed_thrust, 1e-6), 0.5))
     return Limits(y, v, e, coasts, o.longest_transfer / SIDEREAL_DAY, o.largest_last or last)
 

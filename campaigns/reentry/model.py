@@ -151,7 +151,7 @@ MODEL = model(
         (1e-5, 1e-5, 1e-5, 1e-8, 1e-8, 1e-8, 10.0),
         control_period=lambda o: o.guidance_period if o.guidance != CHOICES.guidance.none else np.inf,
         method="dp54",
-        attempts=50_000,
+        attempts=200_000,  # a law with the shortest period steps so often in 2000 s
     ),
     kernel_parameters=prepared(prepare, Inputs),
     prepare=prepare,

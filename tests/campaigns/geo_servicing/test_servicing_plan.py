@@ -240,6 +240,11 @@ def test_two_corrections_cannot_keep_all_limits_and_that_is_said():
         fly_one(**PERFECT, planned_corrections=2.0)
 
 
+def test_coasts_longer_than_the_whole_transfer_may_take_are_refused():
+    with pytest.raises(ModelError, match=r"coasts of 3 corrections take 1\.00 days: give more longest_transfer_days"):
+        fly_one(**PERFECT, longest_transfer_days=0.9)
+
+
 def test_a_flight_that_ends_before_the_day_after_a_designed_transfer_is_refused():
     """Its metrics would be missing: the transfer takes 2.07 days, and the place is that of the day after."""
     with pytest.raises(ModelError, match=r"take 3\.07 days: give duration_days 3\.2 or more"):
