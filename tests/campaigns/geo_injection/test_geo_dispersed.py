@@ -210,6 +210,12 @@ def test_a_planar_last_burn_is_aimed_from_the_perigee_where_there_is_no_node():
     assert aimed["plane_error_deg"] < 1e-9
 
 
+def test_a_thrust_too_small_to_begin_the_search_is_refused_with_the_fix():
+    row = fly_one(method="staged", thrust_n=1.0)
+    assert row["status"] == "refused"
+    assert "give more thrust_n" in row["reason"]
+
+
 def test_a_sequence_that_has_no_design_is_refused_with_how_far_the_search_got():
     row = fly_one(thrust_n=300.0)  # at the mass flow of the large engine: 49 m/s of exhaust speed
     assert row["status"] == "refused"
