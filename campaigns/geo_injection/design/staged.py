@@ -170,7 +170,9 @@ def fly_shortest(stage: Stage, primer: np.ndarray, rate: np.ndarray, duration: f
         basis[:, 8:] = np.eye(m)
         columns = free[:, None] - _residuals(stage, basis)[:, m : m + 6].T
         if not np.isfinite(columns).all():
-            raise ModelError("the search for the shortest burn cannot begin, as it would last too long; give more thrust_n")
+            raise ModelError(
+                "the search for the shortest burn cannot begin, as it would last too long; give more thrust_n"
+            )
         x[8:] = np.linalg.lstsq(columns, free, rcond=None)[0]
         x, left, iterations = searched(partial(_residuals, stage), x)
     if not left < SOLVED or x[6] <= 0.0:
