@@ -81,7 +81,7 @@ Inputs = inputs(
     duration_s=Setting(300.0, "length of the flight, up to the end of the step that reaches it", low=1e-3, high=1e6),
     step_s=Setting(0.01, "integration step", low=1e-4, high=1.0),
     steps_per_sample=Setting(
-        1.0, "integration steps from one sample of the control to the next", low=1, high=1e6, unit=""
+        1.0, "integration steps from one sample of the control to the next", low=1, high=1e6, whole=True, unit=""
     ),
 )  # fmt: skip
 

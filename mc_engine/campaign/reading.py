@@ -154,11 +154,14 @@ def _in_words_of_toml(message: str) -> str:
     return _lower_first(message) + _TOML_FIXES.get(message, "")
 
 
+_OF_OTHERS = {"settings": "; settings are given in [parameters]"}
+
+
 def read_sections(document: dict[str, Any], findings: Findings) -> Sections:
     """Read every section, noting all that is wrong inside each."""
     for name in document:
         if name not in CampaignFile.model_fields:
-            near = "" if findings.full else hint(name, CampaignFile.model_fields)
+            near = "" if findings.full else _OF_OTHERS.get(name) or hint(name, CampaignFile.model_fields)
             findings.add(name, f"is not a section{near}")
     if "campaign" not in document:
         findings.add("campaign", "is missing: the table [campaign] with model, design, ...")

@@ -25,6 +25,8 @@ def test_all_mistakes_are_found_in_one_pass():
         design = "lsh"
         cases = true
         seed = -1
+        [settings]
+        step_s = 0.1
         [parameters]
         mass_kg = nan
         [dispersion.a]
@@ -45,6 +47,7 @@ def test_all_mistakes_are_found_in_one_pass():
     """)
     assert messages == {
         "retentoin": 'is not a section; did you mean "retention"?',
+        "settings": "is not a section; settings are given in [parameters]",
         "campaign.model": 'is missing: a module such as "campaigns.deorbit", or "model.py" beside this file',
         "campaign.modle": 'is not a known key; did you mean "model"?',
         "campaign.design": '"lsh" is not known; did you mean "lhs"?',
