@@ -99,7 +99,8 @@ class InterpretedFlight:
             return bool(arguments[0] < arguments[-1].sample * self._period)
         if name != "switch":
             return False
-        acting = [event.action for event, hit in zip(self.model.event_list, arguments[-1], strict=True) if hit > 0.5]
+        # without events the loops have one all the same, see `_no_events`: not strict
+        acting = [event.action for event, hit in zip(self.model.event_list, arguments[-1], strict=False) if hit > 0.5]
         return "switch" not in acting or "stop" in acting
 
     def call(self, name: str, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:

@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from flown_models import FOLDER, flown, inputs_of, same_bytes
+from flown_models import FOLDER, OSCILLATOR, flown, inputs_of, same_bytes
 from scipy.optimize import brentq
 
-from mc_engine.flight.flight import fly_history
-from mc_engine.model import load_model
+from mc_engine.flight.flight import fly_history, fly_interpreted
+from mc_engine.flight.interpreted import InterpretedFlight
+from mc_engine.model import AdaptiveStep, load_model
 
 MU = 398600.4418e9
 
@@ -115,6 +116,17 @@ def test_the_control_is_sampled_at_its_times_with_its_own_draws(wave):
     """Samples at 0, 7, 14, ... 49 s: the last push is the draw of the eighth."""
     longer = flown(wave, noise_m_s2=1.0, stop_s=np.array([50.0, 55.9, 56.1]), case_ids=np.array([4, 4, 4]))
     assert longer["push_m_s2"][0] == longer["push_m_s2"][1] != longer["push_m_s2"][2]
+
+
+def test_a_flight_with_samples_and_no_event_has_the_same_bits_interpreted():
+    sampled = replace(OSCILLATOR, clock=AdaptiveStep(until=3.0, control_period=0.7))
+    columns = flown(sampled, case_ids=[5], noise_m_s2=0.1, gain_1_s=0.2)
+    inputs = inputs_of(sampled, {"noise_m_s2": 0.1, "gain_1_s": 0.2})
+    time, status, states, metrics = fly_interpreted(InterpretedFlight(sampled), inputs, 5, 1)
+    assert (time[0], status[0], columns["samples"][0]) == (3.0, 0.0, 5.0)
+    for fields, rows, before in ((sampled.states, states, "end_"), (sampled.metrics, metrics, "")):
+        for field, row in zip(fields, rows, strict=True):
+            assert row[0] / field.si_factor == columns[f"{before}{field.name}"][0], field.name
 
 
 @pytest.mark.parametrize("width", [1, 8])
