@@ -159,9 +159,13 @@ def test_log_errs_by_at_most_one_ulp(x):
     assert error_in_ulp("log", x) <= 1.0
 
 
-@pytest.mark.parametrize("x", [powers_of_ten(-307, 308), spread_out(1.0, 4.0)], ids=["all", "two octaves"])
-def test_rsqrt_errs_by_at_most_one_ulp(x):
-    assert error_in_ulp("rsqrt", x) <= 1.0
+@pytest.mark.parametrize(
+    "x",
+    [powers_of_ten(-307, 308), spread_out(1.0, 4.0), [1.0000065507238864, 262145.7172329625]],
+    ids=["all", "two octaves", "worst of 40 million"],
+)
+def test_rsqrt_errs_by_at_most_one_ulp_and_a_hundredth(x):
+    assert error_in_ulp("rsqrt", x) <= 1.01
 
 
 @pytest.mark.parametrize(
