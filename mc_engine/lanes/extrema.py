@@ -127,9 +127,9 @@ def nearer_zero(x, value, slope, back):
 
 
 @physics
-def later_fall(when, x, t, h, mask):
-    """Last time above zero, x steps of h [s] after t where the mask holds, if that is later."""
-    time = t + x * h
+def later_fall(when, x, chord, smooth, t, h, mask):
+    """Last time above zero, x steps of h [s] after t where the mask holds, `chord` steps if not smooth, if later."""
+    time = t + where(smooth > 0.0, x, chord) * h
     return where(mask & (time > when), time, when)
 
 

@@ -249,13 +249,13 @@ def _largest_size(largest, difference, mask):
 
 
 @physics
-def _smooth_where_faded(smooth, before, last, most, bend, change):
-    """`smooth` where the last differences are small and the newest curvature is like the one before; else 0."""
-    alike = (bend >= 0.0) | (bend >= extrema.ALIKE * (bend - change))
+def _smooth_where_faded(smooth, before, last, most, bend, change, crest):
+    """`smooth` where the last differences are small and, if crest is 1, the newest curvature like the last; else 0."""
+    alike = (crest * bend >= 0.0) | (bend >= extrema.ALIKE * (bend - change))
     return where((last <= most * before) & alike, smooth, 0.0)
 
 
-def _smooth_of_differences(differences, count, smooth):
+def _smooth_of_differences(differences, count, smooth, crest):
     """`smooth` of outputs whose differences decrease with their order; 0 if their values contain a jump or corner."""
     n = minimum(count, float(LOOKS))
     late = n - where(n < _FEW, 1.0, where(n < float(LOOKS), 2.0, 3.0))
@@ -266,7 +266,7 @@ def _smooth_of_differences(differences, count, smooth):
         before = map_fields(_sum_of_sizes, before, difference, not mask)
         last = map_fields(_largest_size, last, difference, mask & (n > float(order)))
     bend, change = take_stage(differences, 2, smooth), take_stage(differences, 3, smooth)
-    return map_fields(_smooth_where_faded, smooth, before, last, most, bend, change)
+    return map_fields(_smooth_where_faded, smooth, before, last, most, bend, change, crest)
 
 
 smooth_of_differences = compile_callable(_smooth_of_differences)
@@ -299,17 +299,17 @@ search_crest = compile_inline(_search_crest)
 
 def _search_fall(looks, newest, back, t, h, count, lanes, last):
     """Last times above zero, with the falls between the value `back` steps before the newest and the next value."""
-    w1 = take_stage(looks.lasts, (newest - back) % LOOKS, last)
+    w1, middle = take_stage(looks.lasts, (newest - back) % LOOKS, last), 0.0 * t + float(back)
     w2 = take_stage(looks.lasts, (newest - max(back - 1, 0)) % LOOKS, last)
     falls = map_fields(extrema.falls, w1, w2, lanes)
     if any_lane(any_field(falls)):
         form_differences(looks.lasts, looks.last_differences, newest, last)
-        middle = 0.0 * t + float(back)
-        x = map_fields(extrema.fall_start, w1, w2, middle, lanes)
+        x = chord = map_fields(extrema.fall_start, w1, w2, middle, lanes)
         for _ in range(_ITERATIONS):
             value, slope, _ = interpolate(looks.last_differences, count, x)
             x = map_fields(extrema.nearer_zero, x, value, slope, middle)
-        last = map_fields(extrema.later_fall, last, x, t, h, falls)
+        smooth = smooth_of_differences(looks.last_differences, count, map_fields(_kept, 0.0 * t + 1.0, falls), 0.0)
+        last = map_fields(extrema.later_fall, last, x, chord, smooth, t, h, falls)
     return last
 
 
@@ -325,7 +325,7 @@ def _search(looks, number, t, h, count, closing, lanes, smooth, best, when, last
     """
     newest, nearest = number % LOOKS, 0 if closing else 1
     form_differences(looks.peaks, looks.peak_differences, newest, best)
-    smooth = smooth_of_differences(looks.peak_differences, count, smooth)
+    smooth = smooth_of_differences(looks.peak_differences, count, smooth, 1.0)
     everywhere = lanes & ((count < float(LOOKS)) if closing else (count == float(LOOKS)))
     for i in range(LOOKS - nearest):
         back = LOOKS - 1 - i

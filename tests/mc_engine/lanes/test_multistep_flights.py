@@ -120,6 +120,15 @@ def test_a_corner_or_a_jump_among_the_looks_makes_no_extreme_of_the_polynomial()
     np.testing.assert_allclose(columns["wave_top"], 2.0, rtol=1e-6)
 
 
+@pytest.mark.parametrize("until", [9.1, 9.5])
+def test_a_corner_among_the_looks_leaves_a_last_time_to_the_chord(until):
+    step, phases = 0.05, np.linspace(0.0, 0.4, 400)  # the wave leaves its limit two steps before it falls below 0.8
+    finer = replace(CORNERS, clock=replace(CORNERS.clock, step=step, until=until))
+    columns = flown(by(finer, "abm8"), phase_rad=phases)
+    error = columns["limited_last_s"] - (3.0 * np.pi - np.arcsin(0.4) - phases)
+    assert np.abs(error).max() < 0.01 * step  # by the polynomial up to 0.7
+
+
 def test_a_crest_before_a_sample_is_the_same_beside_a_case_that_ends_in_that_step():
     # crests before the look at 3.1 s, the last before a sample; two cases break, one of them in the step after
     crests = np.append(np.linspace(3.04, 3.09, 6), [3.1, 3.1])

@@ -3,7 +3,19 @@
 from collections import namedtuple
 
 from mc_engine.lanes import minimum, physics, sin, where
-from mc_engine.model import Field, FixedStep, Parameter, inputs, maximum_of, metrics, minimum_of, model, outputs, states
+from mc_engine.model import (
+    Field,
+    FixedStep,
+    Parameter,
+    inputs,
+    last_above,
+    maximum_of,
+    metrics,
+    minimum_of,
+    model,
+    outputs,
+    states,
+)
 
 Inputs = inputs(phase_rad=Parameter(0.0, "of the wave at the start"))
 State = states(x_rad="phase")
@@ -17,6 +29,7 @@ Outputs = outputs(
 )
 Metrics = metrics(
     limited_top=maximum_of("limited", unit=""),
+    limited_last_s=last_above("limited", 0.8),
     relay_top=maximum_of("relay", unit=""),
     relay_bottom=minimum_of("relay", unit=""),
     saw_top=maximum_of("saw", unit=""),
