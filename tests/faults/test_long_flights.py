@@ -23,7 +23,7 @@ EDITS = (
     ("FixedStep(step=10.0, until=10_000.0)", "FixedStep(step=1e-5, until=10_000.0)"),
     ("def climb(s)", "def climb(t, p)"),
     ("return s.x * s.vx + s.y * s.vy", "return where(p.pitch_error == 0.0, p.burn_dv - t / 1e-3, 1.0)"),
-    ("import cos, physics, sin, sqrt", "import cos, physics, sin, sqrt, where"),
+    ("import cos, physics, rsqrt, sin, sqrt", "import cos, physics, rsqrt, sin, sqrt, where"),
 )
 NEVER, SOON = 1e7, 1.0  # burns [m/s] whose nominal case flies for minutes, or for a millisecond
 

@@ -270,7 +270,7 @@ def test_a_nominal_case_that_does_not_complete_among_cases_that_do_is_told(tmp_p
     edits = [
         ("def climb(s)", "def climb(s, p)"),
         (CLIMB, f"return {CLIMB.removeprefix('return ')} + where(p.pitch_error == 0.0, 1e20, 0.0)"),
-        ("import cos, physics, sin, sqrt", "import cos, physics, sin, sqrt, where"),
+        ("import cos, physics, rsqrt, sin, sqrt", "import cos, physics, rsqrt, sin, sqrt, where"),
     ]
     sentence = only(faults(campaign_with(tmp_path, *edits)))
     assert sentence.startswith("the nominal case does not complete: it is no-stop (")
