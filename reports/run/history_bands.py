@@ -1,7 +1,7 @@
 """What the flights of many cases have in common: envelopes of a history quantity over the time."""
 
 from collections.abc import Sequence
-from itertools import count, pairwise
+from itertools import count
 
 import numpy as np
 import pandas as pd
@@ -49,19 +49,55 @@ def history_envelopes(histories: pd.DataFrame, case_ids: Sequence[int], names: S
     if len(case_ids) < FEWEST_CASES:
         return {}
     chosen = histories[histories["case_id"].isin(case_ids)].sort_values(["case_id", "t_s"], kind="stable")
-    starts = np.flatnonzero(np.diff(chosen["case_id"].to_numpy(), prepend=-2))
-    flights = [slice(*rows) for rows in pairwise([*starts.tolist(), len(chosen)])]
-    times = _by_flight(chosen["t_s"], flights)
-    grid = _instants(times)
-    return {name: _envelope(grid, times, _by_flight(chosen[name], flights)) for name in names}
+    instants = _Instants(chosen["case_id"].to_numpy(), chosen["t_s"].to_numpy())
+    return {name: _envelope(instants, chosen[name].to_numpy(dtype=np.float64)) for name in names}
 
 
-def _by_flight(column: pd.Series, flights: list[slice]) -> list[np.ndarray]:
-    values = column.to_numpy()
-    return [values[rows] for rows in flights]
+class _Instants:
+    """Instants of an envelope, and where they lie between the rows of the flights, which follow one another.
+
+    case, t : float[rows], case and time of each row, in ascending order
+    """
+
+    def __init__(self, case: np.ndarray, t: np.ndarray):
+        first = np.flatnonzero(np.diff(case, prepend=-2))
+        last = np.append(first[1:], case.size) - 1
+        times = [t[start : end + 1] for start, end in zip(first, last, strict=True)]
+        self.grid = grid = _grid(times)
+        self.n_flights = first.size
+        found = first[:, None] + np.array([np.searchsorted(time, grid, "right") - 1 for time in times])
+        self._row = row = np.maximum(found, first[:, None])
+        self._next = after = np.minimum(row + 1, last[:, None])
+        length = np.where(after > row, t[after] - t[row], 1.0)
+        ended = grid > t[last][:, None]
+        self._part = np.where(ended, np.nan, np.maximum(grid - t[row], 0.0) / length)
+        self._flight = np.repeat(np.arange(self.n_flights), last - first + 1)
+        self._left = np.clip(np.searchsorted(grid, t, "right") - 1, 0, grid.size - 2)
+        self._in_right_half = 2.0 * t > grid[self._left] + grid[self._left + 1]
+
+    def values(self, y: np.ndarray) -> np.ndarray:
+        """float[flights, instants], straight lines between the rows y; not-a-number after the end of a flight."""
+        with np.errstate(invalid="ignore"):  # infinite differences
+            between = y[self._row] + self._part * (y[self._next] - y[self._row])
+        return np.where(self._part == 0.0, y[self._row], between)
+
+    def reach_peaks(self, curves: dict[float, np.ndarray], y: np.ndarray, values: np.ndarray) -> None:
+        """Let the curves of the extremes reach the peaks of flights between two instants, each at the nearer one.
+
+        A peak is a row of a flight beyond its values at both instants; it would be cut off.
+        """
+        before, after = values[self._flight, self._left], values[self._flight, self._left + 1]
+        nearest = self._left + (self._in_right_half & np.isfinite(after))
+        for probability, extreme, peak in (
+            (0.0, np.fmin, y < np.fmin(before, after)),
+            (1.0, np.fmax, y > np.fmax(before, after)),
+        ):
+            curve = curves[probability]
+            kept = peak & np.isfinite(y) & np.isfinite(curve[nearest])
+            extreme.at(curve, nearest[kept], y[kept])
 
 
-def _instants(times: list[np.ndarray]) -> np.ndarray:
+def _grid(times: list[np.ndarray]) -> np.ndarray:
     """Instants to look at: those of the first case if all share them, else even ones to the end of the longest."""
     first = times[0]
     if all(time.size == first.size and (time == first).all() for time in times):
@@ -69,12 +105,12 @@ def _instants(times: list[np.ndarray]) -> np.ndarray:
     return np.linspace(min(time[0] for time in times), max(time[-1] for time in times), INSTANTS)
 
 
-def _envelope(grid: np.ndarray, times: list[np.ndarray], values: list[np.ndarray]) -> Envelope:
-    rows = np.array([np.interp(grid, t, y, right=np.nan) for t, y in zip(times, values, strict=True)])
-    table = np.sort(np.where(np.isfinite(rows), rows, np.nan), axis=0)  # not-a-numbers last, as flights that have ended
+def _envelope(instants: _Instants, y: np.ndarray) -> Envelope:
+    values = instants.values(y)
+    table = np.sort(np.where(np.isfinite(values), values, np.nan), axis=0)  # not-a-numbers last, as flights that ended
     flying = np.count_nonzero(np.isfinite(table), axis=0)
     curves = {}
-    for probability in envelope_probabilities(len(times)):
+    for probability in envelope_probabilities(instants.n_flights):
         place = probability * (flying - 1)
         low = np.floor(place).astype(int)
         high = np.minimum(low + 1, flying - 1)
@@ -83,30 +119,5 @@ def _envelope(grid: np.ndarray, times: list[np.ndarray], values: list[np.ndarray
         enough = (flying >= FEWEST_CASES) & (flying * min(probability, 1.0 - probability) >= 1.0)
         supported = enough | (probability in (0.0, 1.0))
         curves[probability] = np.where(supported, below + (place - low) * (above - below), np.nan)
-    _reach_peaks(curves, rows, grid, times, values)
-    return Envelope(grid, curves, len(times))
-
-
-def _reach_peaks(
-    curves: dict[float, np.ndarray],
-    rows: np.ndarray,
-    grid: np.ndarray,
-    times: list[np.ndarray],
-    values: list[np.ndarray],
-) -> None:
-    """Let the curves of the extremes reach the peaks of flights between two instants, each at the nearer one.
-
-    A peak is a row of a flight beyond its values at both instants, `rows`; it would be cut off.
-    """
-    t, y = np.concatenate(times), np.concatenate(values)
-    flight = np.repeat(np.arange(len(times)), [one.size for one in times])
-    left = np.clip(np.searchsorted(grid, t, "right") - 1, 0, grid.size - 2)
-    before, after = rows[flight, left], rows[flight, left + 1]
-    nearest = left + ((2.0 * t > grid[left] + grid[left + 1]) & np.isfinite(after))
-    for probability, extreme, peak in (
-        (0.0, np.fmin, y < np.fmin(before, after)),
-        (1.0, np.fmax, y > np.fmax(before, after)),
-    ):
-        curve = curves[probability]
-        kept = peak & np.isfinite(y) & np.isfinite(curve[nearest])
-        extreme.at(curve, nearest[kept], y[kept])
+    instants.reach_peaks(curves, y, values)
+    return Envelope(instants.grid, curves, instants.n_flights)
