@@ -76,6 +76,10 @@ def _metric_table(comparison: Comparison) -> Iterator[str]:
     if len(rows) > 1:
         sure = percent_digits(comparison.confidence)
         yield f"in brackets: {sure} % intervals, each by itself; p-values are adjusted for all tests together"
+    some = [change for change in comparison.moved if 0 < (change.differing or 0) < change.n_used[0]]
+    if some:
+        pairs = [f"{change.metric} ({change.differing:,} of {change.n_used[0]:,})" for change in some]
+        yield f"shift of the pairs that differ, not of all: {', '.join(pairs)}"
     if any(_TIES in row for row in rows):
         yield f"{_TIES}: so many cases have equal values that the size of a significant change is hidden; see --report"
     if any(_NO_INTERVAL in cell for row in rows for cell in row):

@@ -61,7 +61,8 @@ GLOSSARY = Terms(
         (
             "shift",
             "The shift from run A to run B at which the test statistic is zero: the Hodges–Lehmann estimate, in "
-            "standard deviations σ of run A. Means of both runs are in columns of their own.",
+            "standard deviations σ of run A; of pairs, only of those that differ. Means of both runs, of all cases "
+            "used, are in columns of their own.",
         ),
         (
             "ties",

@@ -150,6 +150,19 @@ def test_two_pairs_that_differ_among_many_have_no_interval_and_no_infinite_ends(
     assert "∞]" not in shown
 
 
+def test_a_shift_of_some_pairs_is_not_told_as_one_of_all_cases(tmp_path):
+    some = np.arange(400) % 7.0
+    moved = np.where(np.arange(400) < 40, some + 1.0, some)
+    found = compared(run(tmp_path / "a", pulses=some), run(tmp_path / "b", pulses=moved, shift=0.4))
+    lines = list(comparison_lines(found))
+    assert [line for line in lines if line.startswith("shift of the pairs that differ")] == [
+        "shift of the pairs that differ, not of all: pulses (40 of 400)"
+    ]
+    assert "of pairs, only of those that differ" in str(build_comparison(found))
+    unpaired = compared(run(tmp_path / "c", pulses=some), run(tmp_path / "d", seed=2, pulses=moved))
+    assert not [line for line in comparison_lines(unpaired) if line.startswith("shift of the pairs")]
+
+
 def test_what_changed_in_code_and_campaign_is_told(tmp_path):
     changes = {
         "engine": "0.3.0",
