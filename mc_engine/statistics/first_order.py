@@ -34,7 +34,8 @@ def first_order(column: InputColumn, table: np.ndarray) -> tuple[np.ndarray, np.
     level of words or switches, with the degrees of freedom subtracted (Kelley's ε², Proc. Natl. Acad. Sci. 21 (1935),
     554-559), so it may be below 0.  The number of bins, 0.7 sqrt(n), is that of Plischke, Borgonovo & Smith, Eur. J.
     Oper. Res. 226 (2013), 536-550.  Without the lines, the trend within the wide outer bins would count as noise.
-    The error is that of the influence function of the ratio of the two variances, too large at an index of 0.
+    The error is that of the influence function of the ratio of the two variances, too large at an index of 0.  It does
+    not cover that a jump or a long tail within a bin counts as scatter, which makes the index too small.
     """
     share, error, _ = _by_bins(column, standardised(table))
     return share, error

@@ -154,7 +154,9 @@ def _note(flown: Flown, contributions: Contributions, shown: list[str]) -> str:
         "draws contribute. "
     ) * any(row.input == UNEXPLAINED for row in rows)
     note = (
-        f"Estimated from the table of cases. {unexplained}{each} SRC, PRCC and Spearman: trends with their direction. "
+        f"Estimated from the table of cases. {unexplained}{each} First-order effects are those of bins of an input: "
+        "one that is due to a jump or a long tail of the metric within a bin is found too small, beyond its interval. "
+        "SRC, PRCC and Spearman: trends with their direction. "
         "R²: fraction of the variance that the linear regression behind SRC explains."
     )
     correlated = _correlated(contributions)

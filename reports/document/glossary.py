@@ -71,9 +71,10 @@ GLOSSARY = Terms(
         ),
         (
             "exactness of the bounds",
-            "Bounds and intervals are exact for independent draws (mc). The number of cases was fixed in advance "
-            "unless the report says otherwise. Latin hypercube and Sobol designs scatter less, so the same bounds are "
-            "then conservative. Bounds do not cover errors of the model.",
+            "Bounds on probabilities and percentiles are exact for independent draws (mc); intervals of means and of "
+            "the effects of inputs are approximate. The number of cases was fixed in advance unless the report says "
+            "otherwise. Latin hypercube and Sobol designs scatter less, so the same bounds are then conservative. "
+            "Bounds do not cover errors of the model.",
         ),
         (
             "ellipse",

@@ -76,6 +76,21 @@ def test_an_input_that_only_names_a_draw_has_no_effect_of_its_own_in_page_and_da
     assert "[sensitivity]" in table.note
 
 
+def test_a_note_says_that_first_order_effects_of_jumps_are_found_too_small():
+    """The settling time is one where the burn is among the largest twentieth: this input explains all of it."""
+    run = synthetic_run(1000, failed=0)
+    ve = run.table["ve_pct"]
+    run.table["settling_time_s"] = np.where(ve > np.quantile(ve, 0.95), 1.0, 0.0)
+    document = build(run, "run")
+    records = json.loads(render_json(document))["contributors"]
+    (jump,) = [one for one in records if one["metric"] == "settling_time_s" and one["input"] == "ve_pct"]
+    assert jump["first_interval"][1] < 1.0
+    assert jump["total_interval"][1] == 1.0
+    found = next(one for one in document.sections if one.anchor == "drivers")
+    assert "too small, beyond its interval" in block(found, Table, "Contributors to each metric").note
+    assert "intervals of means and of the effects of inputs are approximate" in str(document)
+
+
 def test_without_a_dispersed_input_a_sentence_says_why_there_are_no_contributors():
     for inputs in ([], [{"name": "ve_pct", "random_draw": True}, {"name": "oe_pct", "random_draw": True}]):
         run = synthetic_run(200, failed=0)
