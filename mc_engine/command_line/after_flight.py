@@ -135,7 +135,7 @@ def summary(
     metric: Annotated[list[str] | None, typer.Option(help="Only this metric; may be given several times.")] = None,
 ) -> None:
     """Print moments and quantiles of the metrics of a run. The run may have any size; it is read part by part."""
-    from mc_engine.runner.summary import summaries, summary_lines
+    from mc_engine.runner.summary import analyses_line, summaries, summary_lines
     from mc_engine.section import ReportSection
     from mc_engine.statistics import SAMPLING_DESIGNS
 
@@ -149,7 +149,10 @@ def summary(
         typer.echo("\n".join(summary_lines(name, statistics, store.units[name], random)))
     if random:
         each = 100.0 * ReportSection(**store.manifest.get("report", {})).confidence
-        typer.echo(f"in brackets: distribution-free limits, each holding with {each:.6g} % for independent cases")
+        fixed = " whose number was fixed in advance; here they hold somewhat less often" * bool(analyses_line(store))
+        typer.echo(
+            f"in brackets: distribution-free limits, each holding with {each:.6g} % for independent cases{fixed}"
+        )
 
 
 @app.command()

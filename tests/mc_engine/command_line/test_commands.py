@@ -352,6 +352,8 @@ def test_summary_tells_the_metrics_asked_for_and_refuses_others(here):
     text = call("summary", "flown", "--metric", "propellant_kg").stdout
     assert text.startswith("propellant_kg [kg]: 36 of 40 cases have a number\n  mean ")
     assert text.endswith("each holding with 90 % for independent cases\n")
+    small_store(here / "part", cases=60)  # whose number of cases is not the one fixed in advance
+    assert call("summary", "part").stdout.endswith("fixed in advance; here they hold somewhat less often\n")
     fails_with(
         2, call("summary", "flown", "--metric", "fuel"), '"fuel" is no metric of this run; it has', "propellant_kg"
     )
