@@ -24,9 +24,9 @@ import numpy as np
 
 from mc_engine.errors import EngineError, StoreError
 from mc_engine.flight.flyer import NOMINAL_NOISE
-from mc_engine.flight.program_flight import Flown, ProgramFlight, flown, in_time, numeric
+from mc_engine.flight.program_flight import Flown, ProgramFlight, flown
 from mc_engine.model.faults import fault_of
-from mc_engine.model.simulator import Refuse, Simulator, load_simulator
+from mc_engine.model.simulator import Refuse, Simulator, in_time, load_simulator, numeric
 from mc_engine.model.sources import leave_importable
 from mc_engine.process_tree import adopt_orphans, die_with_parent, end_children, hold_when_terminated, own_children
 from mc_engine.sampling.streams import stream
@@ -144,12 +144,11 @@ class Worker:
         if self._simulator.batch:
             reply(self._batch(order))
             return
-        names = [*order.inputs]
-        columns = [np.asarray(order.inputs[name]).tolist() for name in names]
+        columns = {name: np.asarray(values).tolist() for name, values in order.inputs.items()}
         metrics = [metric.name for metric in self._simulator.metrics]
         try:
             for place, noise in enumerate(order.noise.tolist()):
-                inputs = {name: values[place] for name, values in zip(names, columns, strict=True)}
+                inputs = {name: values[place] for name, values in columns.items()}
                 result = self._one(inputs, noise, order)
                 if order.log is not None:
                     order.log.add(place, result.row(metrics))

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mc_engine.model.program import JSON_INPUT, template_environment
-from mc_engine.model.simulator import Simulator
+from mc_engine.model.simulator import Simulator, in_time
 from mc_engine.numbers_in_text import counted, is_number
 from mc_engine.process_tree import end_children, how_it_ended, kill_group, last_lines, memory_mib, without_work
 from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, NOT_FINITE, OK, STATUS_NAME, TIME_LIMIT
@@ -199,31 +199,6 @@ class ProgramFlight:
         return in_time({name: table[:, place] for name, place in zip(wanted, places, strict=True)})
 
 
-def numeric(given: Any) -> Any:
-    """What was given, NaN where masked; TypeError for text, truth values, dates and complex, which NumPy would take."""
-    kind = getattr(getattr(given, "dtype", None), "kind", "")
-    items = np.ravel(given) if kind == "O" else given if isinstance(given, list | tuple) else [given]
-    if kind in tuple("bSUmMc") or (kind in ("", "O") and any(isinstance(item, str | bytes | bool) for item in items)):
-        raise TypeError
-    return np.ma.filled(given.astype(np.float64), np.nan) if isinstance(given, np.ma.MaskedArray) else given
-
-
-def in_time(history: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The history as it is; ValueError with a sentence unless its times are numbers that never fall."""
-    times = history["t_s"]
-    if shaped := [name for name, column in history.items() if column.ndim != 1]:
-        shape = history[shaped[0]].shape
-        raise ValueError(
-            f'the column "{shaped[0]}" of the history has the shape {shape}; it must have one number a row'
-        )
-    if not np.isfinite(times).all():
-        raise ValueError("a time of the history is not a number")
-    if (falls := np.flatnonzero(np.diff(times) < 0.0)).size:
-        before, after = times[falls[0]], times[falls[0] + 1]
-        raise ValueError(f"the times of the history fall from {before:.10g} s to {after:.10g} s")
-    return history
-
-
 class TemplateFault(Exception):
     """A template that gives no text for a case."""
 
@@ -307,16 +282,21 @@ def _document(folder: Path, name: str) -> Any:
     text = _text(folder, name)
     try:
         if name.endswith(".json"):
-            return json.loads(text)
+            return json.loads(text, object_pairs_hook=_by_name)
         rows = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
     except (ValueError, RecursionError, csv.Error) as error:
         raise ValueError(f"{name} cannot be read: {error}") from None
     if len(rows) != 2 or len(rows[0]) != len(rows[1]):
         found = f"{counted(len(rows), 'row')} of {' and '.join(str(len(row)) for row in rows[:3]) or 'no'} fields"
         raise ValueError(f"{name} has {found}; it must have one of names and one of numbers, of equal length")
-    same: dict[str, list[str]] = {name.strip(): [] for name in rows[0]}
-    for name, value in zip(*rows, strict=True):
-        same[name.strip()].append(value)
+    return _by_name((name.strip(), value) for name, value in zip(*rows, strict=True))
+
+
+def _by_name(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """Values by name; a list of them for a name that is twice."""
+    same: dict[str, list[Any]] = {}
+    for name, value in pairs:
+        same.setdefault(name, []).append(value)
     return {name: values if len(values) > 1 else values[0] for name, values in same.items()}
 
 

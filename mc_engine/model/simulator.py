@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 KEPT = ("none", "failed", "all")  # of the folders of cases
 _TRUTH = bool | np.bool_
+_NO_NUMBERS = (str, bytes, bool, np.bool_, complex, np.complexfloating, np.datetime64, np.timedelta64)
 _KINDS: dict[str, tuple[Any, str]] = {
     **dict.fromkeys(("title", "name", "source"), (str, "text")),
     **dict.fromkeys(("batch", "deterministic"), (_TRUTH, "True or False")),
@@ -210,3 +211,28 @@ def load_simulator(reference: str, beside: Path | None = None) -> Simulator:
     simulator = load_record(reference, beside, "SIMULATOR", Simulator)
     object.__setattr__(simulator, "name", simulator.name or Path(reference).stem.rpartition(".")[2])
     return simulator
+
+
+def numeric(given: Any) -> Any:
+    """What was given, NaN where masked; TypeError for text, truth values, dates and complex, which NumPy would take."""
+    kind = getattr(getattr(given, "dtype", None), "kind", "")
+    items = np.ravel(given) if kind == "O" else given if isinstance(given, list | tuple) else [given]
+    if kind in tuple("bSUmMc") or (kind in ("", "O") and any(isinstance(item, _NO_NUMBERS) for item in items)):
+        raise TypeError
+    return np.ma.filled(given.astype(np.float64), np.nan) if isinstance(given, np.ma.MaskedArray) else given
+
+
+def in_time(history: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The history as it is; ValueError with a sentence unless its times are numbers that never fall."""
+    times = history["t_s"]
+    if shaped := [name for name, column in history.items() if column.ndim != 1]:
+        shape = history[shaped[0]].shape
+        raise ValueError(
+            f'the column "{shaped[0]}" of the history has the shape {shape}; it must have one number a row'
+        )
+    if not np.isfinite(times).all():
+        raise ValueError("a time of the history is not a number")
+    if (falls := np.flatnonzero(np.diff(times) < 0.0)).size:
+        before, after = times[falls[0]], times[falls[0] + 1]
+        raise ValueError(f"the times of the history fall from {before:.10g} s to {after:.10g} s")
+    return history

@@ -18,6 +18,7 @@ RESULTS = {
     "groups": ('{"time": "1_000"}', "no-result", '"fall_time_s" is 1_000, which is no number'),
     "digits": ('{"time": "\u0661"}', "no-result", '"fall_time_s" is \u0661, which is no number'),
     "truth": ('{"time": true}', "no-result", '"fall_time_s" is true, which is no number'),
+    "twice": ('{"time": 1.0, "time": 2.0}', "no-result", '"fall_time_s" is [1.0, 2.0], which is no number'),
     "deep": ("[" * 100_000, "no-result", "result.json cannot be read: maximum recursion depth"),
     "bytes": ("\udcff", "no-result", "result.json is not text in UTF-8"),
 }
@@ -108,3 +109,16 @@ def test_a_reason_keeps_all_folders_but_that_of_the_worker_and_takes_no_time():
     work = f"{tempfile.gettempdir()}/mc-engine-abcd_123/case-7"
     said = program_flight.flown(1, f"'{work}/a.csv' is not /opt/mc-engine-releases/a.csv").reason
     assert said == "'case-7/a.csv' is not /opt/mc-engine-releases/a.csv"
+
+
+@pytest.mark.parametrize(
+    "numbers", ["[complex(x, 1) for x in time]", "[x > 0.0 for x in time]", "[np.complex64(x + 1j) for x in time]"]
+)
+def test_a_list_of_numpy_numbers_of_another_kind_is_no_array_of_numbers(tmp_path, numbers):
+    file = python_campaign(tmp_path / "kind", cases=4, options="batch=True,")
+    source = file.parent / "sim.py"
+    text = source.read_text()
+    assert '"fall_time_s": time,' in text
+    source.write_text(text.replace('"fall_time_s": time,', f'"fall_time_s": {numbers},'))
+    table = run(load_campaign(file), tmp_path / "run", workers=1).cases()
+    assert set(table["reason"]) == {'"fall_time_s" is no array of numbers'}
