@@ -25,6 +25,7 @@ from mc_engine.store.case_rows import Row, RowLog
 
 _FEW_MINUTES = 360.0  # s, a tenth of an hour
 _TOGETHER = 64  # cases of a batch, where one may end the worker of all
+_TRIED, _ALIKE = 4, 1e-6  # cases of the batch that `check` flies; relative difference that rounding may make
 
 
 def about(number: float, unit: str) -> str:
@@ -153,6 +154,8 @@ class SimulatorFlyer(Flyer):
         still = [name for name in self._names if first[name] == dispersed[name]]
         if still and dispersed["status"] == first["status"] == STATUS_NAME[OK]:
             lines.append(f"the same in the nominal and in case 0: {', '.join(still)}; does an input move it?")
+        if self.simulator.batch:
+            lines += self._of_a_batch()
         if dispersed["status"] != STATUS_NAME[OK]:
             lines.append(f"case 0 ends as {dispersed['status']}: {dispersed['reason']}")
         if flight.left_out:
@@ -172,6 +175,29 @@ class SimulatorFlyer(Flyer):
         )
         return lines
 
+    def _of_a_batch(self) -> Iterator[str]:
+        """One sentence if some cases have other results in a batch than each alone, or it fails as a whole."""
+        ids = np.arange(min(_TRIED, self._campaign.cases))
+        table = {} if self._campaign.first is not None else case_table(self._campaign, ids)
+        inputs = full_inputs(self._campaign, table)
+        columns = {name: np.broadcast_to(np.asarray(value), len(ids)) for name, value in inputs.items()}
+        flight = _Flight(self, columns, ids, None, never)
+        flight.fly()
+        alone = [self.fly({name: column[[k]] for name, column in columns.items()}, ids[[k]]) for k in range(len(ids))]
+        well = all(row["status"][0] == STATUS_NAME[OK] for row in alone)
+        if flight.split and well:
+            yield f"a batch of {len(ids)} fails, each of its cases alone does not: {flight.split}"
+        differing = [
+            name
+            for name in self._names
+            if not np.allclose(flight.results[name], [row[name][0] for row in alone], _ALIKE, 0.0, equal_nan=True)
+        ]
+        if differing:
+            yield (
+                f"not independent: {', '.join(differing)} differ between a batch of {len(ids)} and its cases flown "
+                "alone; return one number a case, in the order of the inputs, with nothing that cases share"
+            )
+
     def process(self, stopped: Callable[[], bool] = never) -> CaseProcess:
         """A process of this simulator, from those that wait or new."""
         return take(self._key, self._setup, stopped)
@@ -188,7 +214,11 @@ class SimulatorFlyer(Flyer):
 
 
 class _Flight:
-    """The cases of one call.  results : their columns, filled as cases end.  left_out : columns of the last history."""
+    """The cases of one call.
+
+    results : their columns, filled as cases end.  left_out : columns of the last history.  split : why the first batch
+    failed that was flown again by halves, or empty.
+    """
 
     def __init__(
         self,
@@ -203,6 +233,7 @@ class _Flight:
         self._flyer, self._columns, self._noise = flyer, columns, noise
         self._keep, self._stopped, self._log, self._on_history = keep, stopped, log, on_history
         self.left_out: tuple[str, ...] = ()
+        self.split = ""
         simulator = flyer.simulator
         self._limit_s = simulator.time_limit_s if simulator.program is None else None  # which keeps its own
         n, self._names = len(noise), [metric.name for metric in simulator.metrics]
@@ -256,7 +287,7 @@ class _Flight:
                 self._record_ended(places[0], end, process)
                 return
             process.end()
-            reply = None
+            reply = flown(end.status, end.reason)
         except BaseException:
             process.end()
             raise
@@ -264,7 +295,8 @@ class _Flight:
             self._flyer.give_back(process)
         if isinstance(reply, Flown) and len(places) == 1:
             self._take(places[0], reply)
-        elif reply is None or isinstance(reply, Flown):
+        elif isinstance(reply, Flown):
+            self.split = self.split or reply.reason
             half = len(places) // 2
             self.fly_together(places[:half])
             self.fly_together(places[half:])

@@ -8,6 +8,7 @@ import pytest
 
 from mc_engine import load_campaign, replay, run
 from mc_engine.flight import program_flight
+from mc_engine.flight.flyers import flyer_of
 from tests.mc_engine.flight.falling_ball import python_campaign
 
 RESULTS = {
@@ -122,3 +123,21 @@ def test_a_list_of_numpy_numbers_of_another_kind_is_no_array_of_numbers(tmp_path
     source.write_text(text.replace('"fall_time_s": time,', f'"fall_time_s": {numbers},'))
     table = run(load_campaign(file), tmp_path / "run", workers=1).cases()
     assert set(table["reason"]) == {'"fall_time_s" is no array of numbers'}
+
+
+IN_A_BATCH = {
+    "short": ("time[: max(1, len(time) - 1)]", 'each of its cases alone does not: "fall_time_s" has the shape (3,)'),
+    "sorted": ("np.sort(time)", "not independent: fall_time_s differ between a batch of 4"),
+    "shared": ("time - time.mean()", "not independent: fall_time_s differ between a batch of 4"),
+    "own": ("time", ""),
+}
+
+
+@pytest.mark.parametrize(("numbers", "said"), IN_A_BATCH.values(), ids=IN_A_BATCH)
+def test_check_says_where_a_batch_has_other_results_than_its_cases_alone(tmp_path, numbers, said):
+    file = python_campaign(tmp_path / "batch", cases=40, options="batch=True,")
+    source = file.parent / "sim.py"
+    source.write_text(source.read_text().replace('"fall_time_s": time,', f'"fall_time_s": {numbers},'))
+    remarks = "\n".join(flyer_of(load_campaign(file)).remarks())
+    assert said in remarks
+    assert ("batch" in remarks) == bool(said)
