@@ -204,12 +204,15 @@ def sample(
     """Print or write the inputs of all cases, without flying them."""
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.campaign.sample_table import SUFFIXES, drawn_inputs, sample_text, write_sample
+    from mc_engine.runner.flown_campaign import companions_of
 
     if out is not None and out.suffix not in SUFFIXES:
         leave(USAGE, f"--out {out}: the name must end in {' or '.join(SUFFIXES)}")
     if out is not None:
         refuse_unwritable_file("--out", out)
     campaign = load_campaign(file, cases=cases)
+    if out is not None and out.resolve() in {campaign.directory.resolve() / name for name in companions_of(campaign)}:
+        leave(USAGE, f"--out {out}: the campaign reads this file; name another")
     table = drawn_inputs(campaign)
     if out is None:
         typer.echo(f"{campaign.name}: {campaign.cases:,} cases, design {campaign.design}\n\n{sample_text(table)}")
