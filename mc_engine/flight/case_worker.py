@@ -124,7 +124,7 @@ class Worker:
     """Flies orders by one simulator, whose files lie in the folder `work`."""
 
     def __init__(self, setup: Setup, work: Path):
-        self._seed, self._work = setup.seed, work
+        self._seed, self._work, self._process = setup.seed, work, os.getpid()
         self._simulator = setup.simulator or _loaded(setup, work)
         self._shared, self._program, self._fly = None, None, self._simulator.fly
         if self._simulator.program is not None:
@@ -167,8 +167,7 @@ class Worker:
         for stream_ in (sys.stdout, sys.stderr):
             with suppress(ValueError, AttributeError):  # of one that the function closed or replaced
                 stream_.flush()
-        keep = None if order.keep is None else Path(order.keep)
-        settle(self._simulator.keep, self._work, name, result.status, keep, inputs)
+        settle(self._simulator.keep, self._work, name, result.status, Path(order.keep) if order.keep else None, inputs)
         _renew_streams(self._streams)
         return result
 
@@ -190,6 +189,8 @@ class Worker:
         except BaseException as error:
             return _failed(error, self._simulator.reference)
         finally:
+            if os.getpid() != self._process:  # a copy by os.fork, whose reply would be taken for that of another case
+                os._exit(1)
             end_children(self._before)
             os.fchdir(self._folder)
         try:

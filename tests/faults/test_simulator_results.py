@@ -141,3 +141,17 @@ def test_check_says_where_a_batch_has_other_results_than_its_cases_alone(tmp_pat
     remarks = "\n".join(flyer_of(load_campaign(file)).remarks())
     assert said in remarks
     assert ("batch" in remarks) == bool(said)
+
+
+@pytest.mark.parametrize("options", ["", "batch=True,"], ids=["case", "batch"])
+def test_a_copy_of_the_process_that_a_case_begins_gives_no_results(tmp_path, options):
+    fork = """
+import os, time
+if os.fork() == 0: inputs = {**inputs, 'mass_kg': 2.0 * inputs['mass_kg']}
+else: time.sleep(0.1)  # in which the copy would reply
+"""
+    tables = []
+    for name, fault in (("plain", ""), ("copies", fork)):
+        file = python_campaign(tmp_path / name, cases=8, fault=fault, options=options)
+        tables.append(run(load_campaign(file), tmp_path / f"{name}_run", workers=1).cases())
+    assert tables[1].equals(tables[0])
