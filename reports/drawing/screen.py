@@ -29,6 +29,7 @@ SIDE_BY_SIDE = 600  # pixels of all names below a panel that stand level
 LONG = 8  # characters of a tick label; of longer ones there are few, or they turn and take the room of the panel
 FRAME = 56  # pixels above and below the rows of a panel that has rows
 SERIES = "<extra>%{fullData.name}</extra>"  # of a hover text: the name of the mark beside it
+POWERS = {"exponentformat": "power", "minexponent": 5}  # of tick labels: 3×10⁹ and not plotly's 3B
 BINS = "bins"  # the mark of bars that count cases
 CASES = "cases"  # the mark of a cloud whose points are cases, with their numbers as its customdata
 
@@ -146,7 +147,8 @@ def _colour_scale(field: Field) -> dict[str, Any]:
     """A trace with the colours of a field beside the panel, and no point."""
     levels, n = field.levels.tolist(), len(field.colour)
     scale = [[end / n, colour] for k, colour in enumerate(field.colour) for end in (k, k + 1)]
-    bar = {"title": {"text": plain(field.label), "side": "right"}, "thickness": 14, "outlinewidth": 0, "tickcolor": INK}
+    bar = {"title": {"text": plain(field.label), "side": "right"}, "thickness": 14, "outlinewidth": 0, "tickcolor": INK,
+           **POWERS}  # fmt: skip
     return {
         "type": "scatter", "mode": "markers", "x": [None], "y": [None], "hoverinfo": "skip",
         "marker": {"color": [levels[0]], "cmin": levels[0], "cmax": levels[-1], "colorscale": scale, "showscale": True,
@@ -175,7 +177,7 @@ def _axis(axis: Axis, ends: tuple[float, float], characters: int) -> dict[str, A
     return {
         "title": {"text": _lines(axis.label, characters), "standoff": 8, "font": {"size": 13}},
         "automargin": True, "gridcolor": GRID, "linecolor": MUTED, "tickcolor": MUTED, "zeroline": False,
-        "ticks": "outside", "ticklen": 4, "showline": True, "exponentformat": "power", "minexponent": 5,
+        "ticks": "outside", "ticklen": 4, "showline": True, **POWERS,
         "nticks": 4 if max(map(len, texts), default=0) >= LONG else 0,
         "autotickangles": [0, -90] if axis.ticks else [0, 30, -90],  # names stand upright, as many as can be
         "range": [float(np.log10(end)) for end in ends] if axis.log else list(ends),

@@ -15,7 +15,7 @@ from mc_engine.statistics.maps import map_metric
 from reports.contents import build
 from reports.document.blocks import FigureBlock, blocks_of
 from reports.drawing import lettering, paper, screen
-from reports.drawing.marks import Axis, Drawing, Limit, Line, Plot, Points
+from reports.drawing.marks import Axis, Drawing, Field, Limit, Line, Plot, Points
 from reports.drawing.palette import INK
 from reports.drawing.strokes import Frame, stroked
 from reports.figures.distributions import bin_edges
@@ -38,6 +38,17 @@ def test_what_is_no_mark_is_named():
         screen.traced(PLOT, PLOT)
     with pytest.raises(TypeError, match="Plot is no mark that is drawn as SVG"):
         stroked(PLOT, Frame(0.0, 0.0, 1.0, 1.0, (0.0, 1.0), (0.0, 1.0)))
+
+
+def test_a_colour_bar_writes_large_numbers_as_the_axes_do():
+    """As powers of ten; plotly's own way is 3B, which no reader of units knows."""
+    z = np.array([[3e9, 3.1e9], [3.2e9, 3.5e9]])
+    field = Field(np.arange(2.0), np.arange(2.0), z, np.array([3e9, 3.2e9, 3.5e9]), "energy [MJ]")
+    specification = screen.specifications(Drawing("", (replace(PLOT, marks=(field,)),)))[0]
+    (bar,) = [one["marker"]["colorbar"] for one in specification["data"] if "colorbar" in one.get("marker", {})]
+    axis = specification["layout"]["xaxis"]
+    for key in ("exponentformat", "minexponent"):
+        assert bar[key] == axis[key]
 
 
 @pytest.mark.parametrize(("stretch", "to_scale"), [(1.0, True), (3.5, True), (9.0, False)])
