@@ -44,7 +44,7 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
     words, member = _classes([verdict.name for verdict in verdicts], violated, inside_words(flown, verdicts))
     # every violation stays in the picture, as far as there is room
     rows = thinned_rows(used, np.flatnonzero(violated.any(axis=0))[: len(used) // 2 if used.size < 4000 else 2000])
-    limits = tuple(_limit_lines(flown, figure, verdicts, violated))
+    limits = tuple(_limit_lines(flown, figure, verdicts))
     if not limits and not violated.any():
         return f"{figure.title}: not drawn; all cases are {inside_words(flown, verdicts)}."
     drawing = case_scatter(
@@ -85,30 +85,32 @@ def _classes(names: list[str], violated: np.ndarray, inside_all: str) -> tuple[l
     return words, member
 
 
-def _limit_lines(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], violated: np.ndarray) -> Iterator[Line]:
+def _limit_lines(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict]) -> Iterator[Line]:
     """Where the surface of a metric over the two columns is at its limit, if the two columns decide it.
 
-    Of a count, such as that of exits, the surface between two cases means nothing.
+    Each of two limits has cases beyond it on its own side.  Of a count, such as that of exits, the surface between two
+    cases means nothing.
     """
     x, y = flown.values(figure.x), flown.values(figure.y)
     metrics = {name: flown.values(name) for name in dict.fromkeys(verdict.metric for verdict in verdicts)}
     metrics = {name: values for name, values in metrics.items() if _continuous(values)}
     surfaces = dict(zip(metrics, map_metrics(x, y, [*metrics.values()]), strict=True))
     nth = 0
-    for verdict, beyond in zip(verdicts, violated, strict=True):
+    for verdict in verdicts:
         surface = surfaces.get(verdict.metric)
-        if surface is None or not _decides(surface, x, y, metrics[verdict.metric], beyond):
+        values = flown.values(verdict.metric)
+        sides = ((np.greater, verdict.at_most), (np.less, verdict.at_least))
+        limits = [(limit, beyond) for beyond, limit in sides if limit is not None]
+        if surface is None or not any(_decides(surface, x, y, values, beyond(values, at)) for at, beyond in limits):
             continue
         import contourpy
 
         generator = contourpy.contour_generator(surface.x, surface.y, np.ma.masked_invalid(surface.value))
-        for limit in (verdict.at_most, verdict.at_least):
-            curves = [] if limit is None else generator.lines(limit)
-            if curves:
-                text = f"{flown.words(verdict.metric)} {limit_text(verdict, flown.unit(verdict.metric))}"
-                words = f"{text}, in the mean over the other inputs"
-                yield outline("limit", words, [np.asarray(curve) for curve in curves], nth)
-                nth += 1
+        curves = [np.asarray(curve) for limit, _ in limits for curve in generator.lines(limit)]
+        if curves:  # one mark for two limits: the legend has one entry for their common words
+            text = f"{flown.words(verdict.metric)} {limit_text(verdict, flown.unit(verdict.metric))}"
+            yield outline("limit", f"{text}, in the mean over the other inputs", curves, nth)
+            nth += 1
 
 
 def _continuous(values: np.ndarray) -> bool:

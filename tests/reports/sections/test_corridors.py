@@ -48,6 +48,16 @@ def test_the_limit_runs_where_the_closed_form_puts_it(drawn):
     assert load == pytest.approx(np.full(len(points), 9.0), abs=1e-3)
 
 
+def test_both_limits_of_one_requirement_are_lines_of_the_same_kind():
+    """The legend has one entry for their common words: two kinds of line would leave one of them unexplained."""
+    between = {**REQUIREMENTS[0], "at_least": 8.5}
+    run = landing_run(3000, failed=20, requirements=[between, *REQUIREMENTS[1:]])
+    (limit,) = marks_of(corridor(build(run, "run")).drawing, Line)
+    points = np.column_stack([limit.x, limit.y])[np.isfinite(limit.x)]
+    load = 8.7 - 4.0 * (points[:, 1] + 2.0) + 0.02 * (points[:, 0] - 7800.0)
+    assert set(np.round(load, 2)) == {8.5, 9.0}
+
+
 def test_a_limit_that_the_two_columns_do_not_decide_is_not_drawn():
     run = landing_run(3000, failed=0)
     draw = np.random.Generator(np.random.Philox(key=6))
