@@ -32,6 +32,8 @@ def companion_blocks(flown: Flown, contributions: Contributions) -> Iterator[Fig
     others = sum(metric not in key and bool(rows) for metric, rows in contributions.by_metric.items())
     if others:
         yield f"The effects on {counted(others, 'other metric')} are in report.json."
+    if left := len(set(flown.key_metrics) - contributions.by_metric.keys()):  # of the table of cases alone
+        yield f"The effects on {counted(left, 'other key metric')} are not estimated."
 
 
 def no_contributors(flown: Flown, silent: list[str], used: str = "cases") -> Iterator[str]:

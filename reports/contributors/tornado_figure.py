@@ -21,20 +21,21 @@ def contributor_figure(
     flown: Flown, by_metric: Iterable[tuple[str, Sequence[Contributor]]], source: str
 ) -> FigureBlock:
     """by_metric : words and contributors of each metric.  source : what the effects were estimated from."""
+    by_metric = list(by_metric)
     panels, told, totals = [], [], False
     interval = f"{given_percent(flown.stated.confidence)} confidence"
-    for words, contributors in list(by_metric)[:MOST_METRICS]:
+    for words, contributors in by_metric[:MOST_METRICS]:
         rows = strongest(contributors)
         names = [name_of(flown, row.input) for row in rows]
         total = _effect_array((row.total, row.total_interval) for row in rows)
         first = _effect_array((row.first, row.first_interval) for row in rows)
         totals |= bool(np.isfinite(total[:, 0]).any())
         panels.append(tornado(words, names, total, first, interval))
-        effects = [f"{name} {number(row.size, 2)}" for name, row in zip(names[:3], rows, strict=False)]
-        told.append(f"{words}: {', '.join(effects)}")
-    caption = (
-        f"{'Total and first-order' if totals else 'First-order'} effects of the contributors to each metric, {source}."
-    )
+        sizes = [f"{name} {number(row.size, 2)}" for name, row in zip(names[:3], rows, strict=False)]
+        told.append(f"{words}: {', '.join(sizes)}")
+    effects = "Total and first-order" if totals else "First-order"
+    drawn = "each metric" if len(panels) == len(by_metric) else f"the first {len(panels)} of {len(by_metric)} metrics"
+    caption = f"{effects} effects of the contributors to {drawn}, {source}."
     return FigureBlock(caption, Drawing("Tornado diagrams", tuple(panels), words="; ".join(told)), "half")
 
 

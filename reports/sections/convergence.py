@@ -15,7 +15,7 @@ from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.drawing.marks import Axis, Drawing, Line, Plot, between
 from reports.drawing.palette import BLUE, SKY
 from reports.run.flown import Flown
-from reports.text.numbers import count, given_percent, interval, number, percent, percentile, with_unit
+from reports.text.numbers import count, first_of, given_percent, interval, number, percent, percentile, with_unit
 
 MOST_METRICS = 8
 MOST_DRAWN = 4
@@ -90,7 +90,9 @@ def _convergence_table(flown: Flown, told: dict[str, tuple[RunningEstimate, ...]
         "independent draws: Student’s for the mean, order statistics for percentiles. "
         "A metric that has not converged may have a certain verdict: that depends on its requirement alone."
     )
-    return Table(f"Convergence of the estimates{flown.sample_words}", columns, rows, note)
+    known = len(flown.key_metrics)
+    whose = f", {first_of(MOST_METRICS, known, 'key metrics')}" if known > MOST_METRICS else ""
+    return Table(f"Convergence of the estimates{whose}{flown.sample_words}", columns, rows, note)
 
 
 def _estimate_row(flown: Flown, name: str, run: RunningEstimate) -> tuple[Cell, ...]:

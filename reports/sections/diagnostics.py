@@ -10,7 +10,7 @@ from reports.document.blocks import FigureBlock
 from reports.drawing.marks import Drawing
 from reports.figures.statistics import correlation_matrix, probability_plot
 from reports.run.flown import Flown
-from reports.text.numbers import count, number
+from reports.text.numbers import count, first_of, number
 
 MOST_METRICS, MOST_INPUTS = 8, 8  # of the matrix
 MOST_PANELS = 12  # of the probability plots
@@ -39,8 +39,9 @@ def correlation_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     strongest = "; ".join(f"{words[i]} and {words[k]} {number(rho[i, k], 2)}" for i, k in pairs[:5])
     picked = f" From {count(rows.size)} cases." if rows.size < flown.n_tried else ""
     caption = (
-        "Spearman’s rank correlations of the key metrics and of the inputs that contribute most to them. Below "
-        f"{chance:.2f} in size, a correlation of {count(fewest)} cases is within chance (3 standard errors).{picked}"
+        f"Spearman’s rank correlations of the {first_of(MOST_METRICS, len(metrics), 'key metrics')} and of the inputs "
+        f"that contribute most to them. Below {chance:.2f} in size, a correlation of {count(fewest)} cases is within "
+        f"chance (3 standard errors).{picked}"
     )
     drawn = Drawing("Correlation matrix", (correlation_matrix(words, rho),), 1, f"The strongest: {strongest}")
     yield FigureBlock(caption, drawn, "matrix")
@@ -69,7 +70,8 @@ def rank_correlations(table: np.ndarray) -> tuple[np.ndarray, int]:
 def normal_probability_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     """Normal probability plots of the key metrics, where a normal distribution is a straight line."""
     drawable = [name for name in flown.key_metrics if flown.summaries[name].n_used >= FEWEST_CASES]
-    names = [name for name in drawable if not flown.summaries[name].constant][:MOST_PANELS]
+    varying = [name for name in drawable if not flown.summaries[name].constant]
+    names = varying[:MOST_PANELS]
     if not flown.random or not names:
         yield f"Not drawn: no key metric has {FEWEST_CASES} different numbers of cases that were drawn at random."
         return
@@ -91,9 +93,9 @@ def normal_probability_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
             )
         )
     caption = (
-        "Normal probability plots of the key metrics. A normal distribution lies on the dashed line; cases outside the "
-        "band are beyond chance at their rank. γ₁: skewness, γ₂: excess kurtosis, both 0 of a normal distribution. "
-        "Extrapolation by σ holds only where the points follow the line."
+        f"Normal probability plots of the {first_of(len(names), len(varying), 'key metrics')}. A normal distribution "
+        "lies on the dashed line; cases outside the band are beyond chance at their rank. γ₁: skewness, γ₂: excess "
+        "kurtosis, both 0 of a normal distribution. Extrapolation by σ holds only where the points follow the line."
     )
     yield FigureBlock(caption, Drawing("Normal probability plots", tuple(panels), 4), "small")
 

@@ -32,6 +32,11 @@ def counted(number: int, noun: str) -> str:
     return f"{count(number)} {noun}{'' if number == 1 else 's'}"
 
 
+def first_of(shown: int, known: int, noun: str) -> str:
+    """What a figure or a table shows of several: key metrics, or first 8 of 15 key metrics."""
+    return noun if shown >= known else f"first {count(shown)} of {count(known)} {noun}"
+
+
 def number(value: float | None, digits: int = 5, scale: float | None = None, up: bool | None = None) -> str:
     """`value` to `digits` significant digits, or to three digits of `scale` (a spread) if that is finer.
 
