@@ -75,7 +75,7 @@ def check(
         heading = f"{campaign.model_reference}: {counted(len(problems), 'problem')}"
         leave(USAGE, "\n".join([heading, *(f"  {problem}" for problem in problems)]))
     typer.echo(
-        f"{campaign.name}: {campaign.cases:,} cases, design {campaign.design}, "
+        f"{campaign.name}: {counted(campaign.cases, 'case')}, design {campaign.design}, "
         f"{counted(len(campaign.dispersions), 'dispersion')}, {counted(len(campaign.correlations), 'correlation')}, "
         f"{counted(len(campaign.requirements), 'requirement')}; valid"
     )
@@ -215,7 +215,8 @@ def sample(
         leave(USAGE, f"--out {out}: the campaign reads this file; name another")
     table = drawn_inputs(campaign)
     if out is None:
-        typer.echo(f"{campaign.name}: {campaign.cases:,} cases, design {campaign.design}\n\n{sample_text(table)}")
+        typer.echo(f"{campaign.name}: {counted(campaign.cases, 'case')}, design {campaign.design}\n")
+        typer.echo(sample_text(table))
     else:
         write_sample(campaign, table, out)
         typer.echo(f"{out}: {campaign.cases:,} cases of {campaign.name}")

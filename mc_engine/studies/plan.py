@@ -66,7 +66,7 @@ def plan_lines(campaign: Campaign, failures: Sequence[int] = range(ROWS), two_si
 
     failures : a row for each number of failed cases.  two_sided : also the cases for intervals by order statistics.
     """
-    yield f"{campaign.name}: {campaign.cases:,} cases, design {campaign.design}"
+    yield f"{campaign.name}: {counted(campaign.cases, 'case')}, design {campaign.design}"
     if campaign.design not in SAMPLING_DESIGNS:
         yield f'shares of cases of design "{campaign.design}" are no probabilities: what follows is for "mc"'
     asked = sorted(campaign.requirements, key=_wanted, reverse=True)

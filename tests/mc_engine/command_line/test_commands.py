@@ -87,6 +87,13 @@ def test_a_model_that_cannot_be_imported_gets_a_sentence_with_its_line(here):
     fails_with(2, call("check", "cart"), "model.py, line 2", "ZeroDivisionError")
 
 
+def test_one_case_is_a_case(here):
+    text = (here / "cart" / "campaign.toml").read_text()
+    (here / "cart" / "campaign.toml").write_text(text.replace("cases = 20", "cases = 1"))
+    for words in (("check", "cart", "--no-model"), ("sample", "cart"), ("plan", "cart")):
+        assert call(*words).stdout.startswith("cart: 1 case, design mc")
+
+
 def test_sample_prints_head_and_summary(here):
     result = call("sample", "cart", "--cases", 30)
     assert result.exit_code == 0
