@@ -38,6 +38,7 @@ from mc_engine.physics.curve_points import (
     turnovers,
 )
 from mc_engine.physics.vectors import Vector
+from mc_engine.suggestions import listed
 
 KINDS = ("linear", "cubic", "nearest")
 OUTSIDE = ("held", "zero", "ends")
@@ -168,8 +169,9 @@ def surface(
     given = {} if units is None else units
     if not isinstance(given, Mapping):
         raise ModelError(f'{words}: units is a dict of a unit for each name, such as {{"x": "km"}}, not {units!r}')
-    for name in given.keys() - ({str(x), str(y), str(z)} if path is not None else {"x", "y", "z"}):
-        raise ModelError(f'{words}: units has "{name}", which is none of its numbers')
+    named = (str(x), str(y), str(z)) if path is not None else ("x", "y", "z")
+    for name in given.keys() - set(named):
+        raise ModelError(f'{words}: units has "{name}"; its numbers are {listed(named)}')
     if path is not None:
         names = [str(x), str(y), str(z)]
         said = {name: partial(_in_units, name) for name in names}

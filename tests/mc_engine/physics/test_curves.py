@@ -254,7 +254,7 @@ def test_numbers_of_arrays_are_in_the_unit_that_is_said():
     assert curve(x=[0, 2], y=[0, 180], x_unit="km", y_unit="deg")(1000.0) == pytest.approx(0.5 * np.pi, rel=1e-15)
     tilted = surface(x=[0, 1], y=[0, 90], z=[[0, 1], [2, 3]], units={"y": "deg", "z": "km"})
     assert tilted(0.5, 0.25 * np.pi) == pytest.approx(1500.0, rel=1e-15)
-    with pytest.raises(ModelError, match='units has "alpha", which is none of its numbers'):
+    with pytest.raises(ModelError, match='units has "alpha"; its numbers are "x", "y", "z"'):
         surface(x=[0, 1], y=[0, 90], z=[[0, 1], [2, 3]], units={"alpha": "deg"})
 
 
