@@ -145,7 +145,7 @@ def _wrong_functions(model: Model) -> Iterator[str]:
             continue
         if name not in INTERPRETED:  # it is handed the arguments that it names
             if not isinstance(function, PhysicsFunction):
-                yield f"{place_of(function)}: `{called}` is not marked; write @physics on the line above it"
+                yield f"{place_of(function)}: {_unmarked(called)}"
             continue
         try:
             inspect.signature(function).bind(*wanted.split(", "))
@@ -333,6 +333,13 @@ def _branches(node: ast.AST) -> bool:
     return isinstance(node, ast.IfExp | ast.BoolOp) or (isinstance(node, ast.Compare) and len(node.ops) > 1)
 
 
+def _unmarked(name: str) -> str:
+    """On a function that is not marked as physics; a lambda cannot have a decorator."""
+    if name == "<lambda>":
+        return "a lambda is not marked; write physics(lambda ...)"
+    return f"`{name}` is not marked; write @physics on the line above it"
+
+
 def _wrong_value(value: Any) -> str:
     """On a value from outside the function that physics cannot read, or must not."""
     home = (getattr(value, "__module__", None) or type(getattr(value, "__self__", None)).__module__ or "").split(".")
@@ -347,6 +354,6 @@ def _wrong_value(value: Any) -> str:
     if isinstance(value, np.ufunc) or (callable(value) and (value in _BUILTINS or home == ["math"])):
         return ""
     if isinstance(value, FunctionType) and home[0] not in ("numpy", *sys.stdlib_module_names):
-        return f"`{value.__name__}` is not marked; write @physics on the line above it"
+        return _unmarked(value.__name__)
     name = getattr(value, "__name__", type(value).__name__)
     return f"`{name}` is not for physics, which has no clocks, files, arrays and objects; {PHYSICS}"

@@ -298,11 +298,11 @@ RECORDS = {
     ),
     "wrong arity": (
         [in_front("def tables(p, o):\n    return [1.0]"), given("tables=tables")],
-        "def tables",
-        "`tables` takes (p, o); the engine gives it (o)",
+        "def tables", "`tables` takes (p, o); the engine gives it (o)",
     ),
     "no decorator": ([(RHS, "def rhs")], "def rhs", "`rhs` is not marked; write @physics"),
     "event without decorator": ([("@physics\ndef climb", "def climb")], "def climb", "`climb` is not marked; write @"),
+    "a lambda": ([given("start=lambda p: 0.0")], "start=lambda", "a lambda is not marked; write physics(lambda ...)"),
     "a metric that is declared": (
         [in_front("@physics\ndef evaluate(t, s):\n    return Metrics(top_speed=t)"), given("evaluate=evaluate")],
         "    return Metrics(",
