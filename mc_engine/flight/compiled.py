@@ -11,7 +11,7 @@ from mc_engine.campaign.loading import Campaign
 from mc_engine.flight import flight
 from mc_engine.flight.contract import breaches, flight_faults, refuse_breaches
 from mc_engine.flight.flyer import Columns, Flyer, Inputs, Process, never
-from mc_engine.flight.kernel import finer, make_kernel_folder, source_digest, usual_width
+from mc_engine.flight.kernel import FINER_STEPS, finer, make_kernel_folder, source_digest, usual_width
 from mc_engine.flight.lost_numbers import first_lost, may_be_lost
 from mc_engine.model.fields import AdaptiveStep
 from mc_engine.model.record import compiled_model
@@ -70,11 +70,12 @@ class CompiledFlyer(Flyer):
         refuse_breaches(self._campaign)
         make_kernel_folder()
 
-    def fly_finer(self, inputs: Inputs, noise: np.ndarray) -> tuple[str, Columns]:
-        """(what is finer, results of the cases) with half of the steps, or a tenth of the tolerances."""
-        clock = self._model.clock
-        by = "a tenth of the tolerances" if isinstance(clock, AdaptiveStep) else "half of the step"
-        return by, flight.fly(self._model, inputs, noise, self._seed, folder=self._folder, clock=finer(clock))
+    def fly_finer(self, inputs: Inputs, noise: np.ndarray, flight_s: float) -> tuple[str, Columns]:
+        """(what is finer, results of the cases), see `finer`.  flight_s : length of their flights [s]."""
+        clock, by = finer(self._model.clock, flight_s), "half of the step"
+        if isinstance(clock, AdaptiveStep):
+            by = f"a tenth of the tolerances and at least {FINER_STEPS:,} steps"
+        return by, flight.fly(self._model, inputs, noise, self._seed, folder=self._folder, clock=clock)
 
     def lost_number(self, inputs: Inputs, noise: int, results: Columns, who: str) -> str:
         if not may_be_lost(self._model, results):

@@ -23,7 +23,7 @@ from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.errors import EngineError
 from mc_engine.flight.compiled import CompiledFlyer
 from mc_engine.flight.flyer import NOMINAL_NOISE
-from mc_engine.flight.kernel import clock_number, finer, grid_of
+from mc_engine.flight.kernel import FINER_STEPS, clock_number, finer, grid_of
 from mc_engine.flight.lost_numbers import first_lost, may_be_lost, not_finite
 from mc_engine.flight.missing_events import events_that_never_happen, why_no_stop
 from mc_engine.flight.repeatability import (
@@ -38,7 +38,7 @@ from mc_engine.flight.repeatability import (
 )
 from mc_engine.garbage_collection import collect_rarely
 from mc_engine.model.faults import MORE, fault_of
-from mc_engine.model.fields import FixedStep
+from mc_engine.model.fields import AdaptiveStep, FixedStep
 from mc_engine.model.record import Model, compiled_model
 from mc_engine.model.trial import fixed_metrics
 from mc_engine.sampling.distributions import column, quantiles
@@ -52,6 +52,7 @@ _PARTNERS = 4  # cases in which an input is tried that does nothing in the nomin
 LONGEST_S = 10.0  # of the flight of one case: with it, all that is flown here takes some minutes
 _NOMINAL = np.array([NOMINAL_NOISE])
 _GROSS = 0.1  # of the size of the states; halving changed sound steps by 0.03 at most, unstable ones by 1 to 100
+_VISIBLE = 1e-4  # of the size of the states: the error of integration is far below
 _ROUNDED = 1e-6  # of a step: a billion steps as numbers of 16 digits miss `until` by less
 
 
@@ -73,6 +74,7 @@ def faults(campaign: Campaign) -> list[str]:
             *(lost or _none_completing(campaign, flown, nominal)),
             *other_bits(campaign, inputs, ids, flown),
         ]
+        faults_of_flight = faults_of_flight or _passed_over(campaign, inputs, ids, flown)
         return faults_of_flight or [
             *_past_until(campaign, nominal),
             *_never_set(campaign, flown, nominal),
@@ -135,7 +137,7 @@ def _too_long(campaign: Campaign, nominal: Columns) -> list[str]:
         return []
     _, step, _ = grid_of(clock, settings)
     with _completed_within(2.0 * LONGEST_S, "with half of its step the nominal case has", campaign):
-        halved = results(campaign, campaign.nominal, _NOMINAL, finer(clock))
+        halved = results(campaign, campaign.nominal, _NOMINAL, finer(clock, nominal[END_TIME][0]))
     name, coarse, fine = "status", nominal["status"][0], halved["status"][0]
     if coarse == fine:
         begun = results(campaign, campaign.nominal, _NOMINAL, replace(clock, until=clock.step))
@@ -151,14 +153,46 @@ def _too_long(campaign: Campaign, nominal: Columns) -> list[str]:
 def _far(model: Model, begun: Columns, coarse: Columns, fine: Columns) -> str:
     """The end time or the first end state that differs grossly between two flights of a case; empty if there is none.
 
-    begun : the case after one step.  States of one unit, such as those of a position, have one size.
+    begun : the case after one step
     """
-    units = {END_TIME: END_TIME} | {f"end_{state.name}": state.unit for state in model.states}
+    units = _units_at_end(model)
     sizes = dict.fromkeys(units.values(), 0.0)
     for name, unit in units.items():
         sizes[unit] = max(sizes[unit], abs(begun[name][0]), abs(fine[name][0]))
     far = (name for name, unit in units.items() if abs(coarse[name][0] - fine[name][0]) > _GROSS * sizes[unit])
     return next(far, "")
+
+
+def _units_at_end(model: Model) -> dict[str, str]:
+    """Unit of the end time and of each end state, by column; states of one unit, as of a position, have one size."""
+    return {END_TIME: END_TIME} | {f"end_{state.name}": state.unit for state in model.states}
+
+
+def _passed_over(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, flown: Columns) -> list[str]:
+    """One sentence if cases end far away, or otherwise, with short steps: an adaptive step looks at a few instants.
+
+    Far is more than the spread of the cases; one alone may be a case at the edge between two ways to end.
+    """
+    model = compiled_model(campaign.model)
+    if not isinstance(model.clock, AdaptiveStep):
+        return []
+    flight_s = float(np.nanmax(flown[END_TIME]))
+    fine = results(campaign, inputs, ids, finer(model.clock, flight_s))
+    elsewhere = flown["status"] != fine["status"]
+    both = ~elsewhere & (flown["status"] == STATUS_NAME[OK])
+    units = _units_at_end(model)
+    sizes = {
+        unit: max(abs(flown[name][both]).max(initial=0.0) for name in units if units[name] == unit)
+        for unit in units.values()
+    }
+    for name, unit in units.items():
+        change = np.where(both, abs(fine[name] - flown[name]), 0.0)
+        elsewhere |= (change > flown[name][both].std()) & (change > _VISIBLE * sizes[unit])
+    if elsewhere.sum() < 2:
+        return []
+    return [f"steps pass over something: {elsewhere.sum()} of the first {ids.size} cases end elsewhere with steps of "
+            f"at most {flight_s / FINER_STEPS:.3g} s; let an event of the time begin and end what acts for a short "
+            "time, such as a burn, or give the clock a `longest_step` that is shorter"]  # fmt: skip
 
 
 def _past_until(campaign: Campaign, nominal: Columns) -> Iterator[str]:

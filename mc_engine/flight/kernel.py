@@ -28,6 +28,7 @@ from mc_engine.model.imports import new_module
 from mc_engine.model.record import Model, sources_of
 
 Builder = Callable[[Model, Path | None, int], Callable[..., Any]]  # gives, as `build_kernel`, what is called
+FINER_STEPS = 2_000  # of a flight with a finer adaptive clock, which then sees what a step of its own may pass over
 _MOST_STEPS = 10**9  # of a flight, as AdaptiveStep's attempts: a year of 0.03 s, a minute of one core
 _ENGINE = (
     "flight/kernel.py",
@@ -245,11 +246,19 @@ def grid_of(clock: FixedStep, settings: Any) -> tuple[int, float, int]:
     return n_steps, step, int(every)
 
 
-def finer(clock: FixedStep | AdaptiveStep) -> FixedStep | AdaptiveStep:
-    """The clock with half of its steps, or a tenth of its tolerances; the control is sampled at the same times."""
+def finer(clock: FixedStep | AdaptiveStep, flight_s: float) -> FixedStep | AdaptiveStep:
+    """The clock with half of its steps, or a tenth of its tolerances and FINER_STEPS steps of a flight at least.
+
+    The control is sampled at the same times.  flight_s : length of the flight [s]
+    """
     if isinstance(clock, AdaptiveStep):
         atol = tuple(0.1 * number for number in clock.atol) if isinstance(clock.atol, tuple) else 0.1 * clock.atol
-        fields: dict[str, Any] = {"rtol": lambda o: 0.1 * clock_number(clock.rtol, o), "atol": atol}
+        fields: dict[str, Any] = {
+            "rtol": lambda o: 0.1 * clock_number(clock.rtol, o),
+            "atol": atol,
+            "longest_step": lambda o: min(clock_number(clock.longest_step, o), flight_s / FINER_STEPS),
+            "attempts": clock.attempts + 10 * FINER_STEPS,
+        }
     else:
         fields = {
             "step": lambda o: 0.5 * grid_of(clock, o)[1],
@@ -275,9 +284,10 @@ def fixed_arguments(clock: FixedStep, settings: Any) -> tuple[Any, ...]:
 def adaptive_arguments(model: Model, clock: AdaptiveStep, settings: Any) -> tuple[np.ndarray, ...]:
     """Tables of the pair, clock and absolute tolerances, as the adaptive kernels take them."""
     pair = PAIRS[clock.method]
-    numbers = [clock_number(item, settings) for item in (clock.until, clock.rtol, clock.control_period)]
-    if not all(number > 0.0 for number in numbers):
-        raise ModelError("the clock has until = {:g} s, rtol = {:g}, control_period = {:g} s; all must be above 0"
-                         .format(*numbers))  # fmt: skip
-    numbers += [float(clock.attempts), clock.first_step, float(pair.order)]
+    given = clock.until, clock.rtol, clock.control_period, clock.longest_step
+    until, rtol, period, longest = (clock_number(item, settings) for item in given)
+    if not all(number > 0.0 for number in (until, rtol, period, longest)):
+        raise ModelError(f"the clock has until = {until:g} s, rtol = {rtol:g}, control_period = {period:g} s, "
+                         f"longest_step = {longest:g} s; all must be above 0")  # fmt: skip
+    numbers = [until, rtol, period, float(clock.attempts), clock.first_step, longest, float(pair.order)]
     return *pair.tables(), np.array(numbers), np.array(np.broadcast_to(clock.atol, len(model.states)), dtype=np.float64)

@@ -53,8 +53,8 @@ from mc_engine.lanes.tuples import (
 )
 from mc_engine.status import NO_STOP, NOT_FINITE, STEP_LIMIT
 
-# until: time limit [s]; period: of the sampled control [s]; attempts: cap; first: first length [s], or 0
-Clock = namedtuple("Clock", "until rtol period attempts first order")
+# until: time limit [s]; period: of the sampled control [s]; attempts: cap; first: first length [s], or 0; longest: [s]
+Clock = namedtuple("Clock", "until rtol period attempts first longest order")
 # part of a step that holds an event: lengths, senses and rates at both sides, which side moved last, next length to
 # look at, how often one was looked at, width at which it is closed
 Bracket = namedtuple("Bracket", "low high at_low at_high rate_low rate_high side look looks width")
@@ -246,7 +246,7 @@ def _fly(
     """
     align_stack()
     end_time, end_status, end_state, metrics = out
-    clock = Clock(clock[0], clock[1], clock[2], clock[3], clock[4], clock[5])
+    clock = Clock(clock[0], clock[1], clock[2], clock[3], clock[4], clock[5], clock[6])
     o = load_scalars(setting_class, settings)
     p, case = load_fields(parameter_class, parameters, 0, width), load(cases, 0, width)
     waiting = width
@@ -257,7 +257,7 @@ def _fly(
     atol = scalars_like(here.s, atol)
     kinds, signs = f.kinds_of(here.values), f.signs_of(here.values)
     new, altered = zero == zero, zero > 0.0  # lanes that begin a case, lanes that the model has changed
-    active, status, attempts, sample, limit = zero + 1.0, zero, zero, zero + 1.0, zero + _NEVER
+    active, status, attempts, sample, limit = zero + 1.0, zero, zero, zero + 1.0, zero + clock.longest
     h, last_ideal = zero, zero + _NONE  # of the step before this one: there is none
     closing, beyond, armed = zero > 0.0, here, map_fields(_nothing, here.values)
     bracket = Bracket(zero, zero, armed, armed, armed, armed, zero, zero, zero, zero)
@@ -272,7 +272,7 @@ def _fly(
                 t, s, m = where(new, 0.0, here.t), select(new, s, here.s), select(new, m, here.m)
                 here = Instant(t, s, m, here.k, here.senses, here.rates, here.values)
                 status, attempts = where(new, 0.0, status), where(new, 0.0, attempts)
-                sample, limit = where(new, 1.0, sample), where(new, _NEVER, limit)
+                sample, limit = where(new, 1.0, sample), where(new, clock.longest, limit)
                 last_ideal = where(new, _NONE, last_ideal)
                 closing = closing & (not new)
                 if history.shape[0] > 0:
@@ -319,7 +319,7 @@ def _fly(
         scaled = next_length(trial, error, ideal, where(good, last_ideal, _NONE))
         last_ideal = where(good, ideal, last_ideal)
         h = where(good, where(cut, maximum(h, scaled), scaled), where(poor, scaled, h))
-        limit = where(dip, turn, where(good, _NEVER, limit))
+        limit = where(dip, turn, where(good, clock.longest, limit))
         closed = flying & (not flying)
         if any_lane(over | looking):
             armed = select(over, hopes, armed)

@@ -251,6 +251,9 @@ class AdaptiveStep:
     method : str, "dop853" (order 8) or "dp54" (order 5)
     attempts : int, a case that needs more steps, accepted and rejected ones together, ends as step-limit; at most 1e9
     first_step : float, length [s] of the first attempt; with 0 the engine chooses it
+    longest_step : float or str, limit of the length of a step [s].  A step does not see what acts for a shorter time
+        than it takes, such as a burn between two times in `rhs`.  Let an event of the time begin and end a burn, or
+        limit the steps to its length; `mc-engine check` and the report of a run tell of what steps have passed over.
 
     >>> AdaptiveStep(until=86_400.0, rtol=1e-10).method
     'dop853'
@@ -263,6 +266,7 @@ class AdaptiveStep:
     method: str = "dop853"
     attempts: int = 100_000
     first_step: float = 0.0
+    longest_step: float | str = np.inf
 
 
 def uses_rates(clock: FixedStep | AdaptiveStep) -> bool:

@@ -190,6 +190,7 @@ def _refuse_clock(clock: FixedStep | AdaptiveStep, settings: list[str], states: 
         _refuse_time("control_period", clock.control_period, settings, most=inf)
     _refuse_time("attempts", clock.attempts, [], least=1.0, most=_MOST_ATTEMPTS)
     _refuse_time("first_step", clock.first_step, [], least=0.0)
+    _refuse_time("longest_step", clock.longest_step, settings, most=inf)
     tolerances = clock.atol if isinstance(clock.atol, tuple) else (clock.atol,) * len(states)
     if len(tolerances) != len(states):
         raise ModelError(f"the clock's `atol` has {len(tolerances)} numbers, the model {len(states)} states")

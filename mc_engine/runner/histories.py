@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mc_engine.campaign.cases import full_inputs
+from mc_engine.campaign.columns import END_TIME
 from mc_engine.campaign.loading import Campaign
 from mc_engine.flight.chunks import drawn
 from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, RunStopped
@@ -75,7 +76,7 @@ def integration_changes(store: Store, campaign: Campaign) -> dict[str, Any] | No
 
     first, metrics = store.parts[0], [metric.name for metric in campaign.model.metrics]
     tried = min(_MOST_FINER, -(-store.n_cases // _FINER_OF), first.rows)
-    columns = [column for column in store.columns if column.name in ("status", *metrics)]
+    columns = [column for column in store.columns if column.name in ("status", END_TIME, *metrics)]
     own = read_part(store.path, first, columns).slice(0, tried)
     cases = np.flatnonzero([word == STATUS_NAME[OK] for word in own["status"].to_pylist()])
     if not cases.size:
@@ -83,7 +84,8 @@ def integration_changes(store: Store, campaign: Campaign) -> dict[str, Any] | No
     table, noise = drawn(campaign, cases)
     inputs = full_inputs(campaign, table)
     numbers = {name: numbers_in(own[name])[cases] for name in metrics}
-    [(by, fine)] = in_threads(lambda flyer: flyer.fly_finer(inputs, noise), [CompiledFlyer(campaign)])
+    flight_s = float(numbers_in(own[END_TIME])[cases].max())
+    [(by, fine)] = in_threads(lambda flyer: flyer.fly_finer(inputs, noise, flight_s), [CompiledFlyer(campaign)])
     before, after = (np.array([columns[name] for name in metrics]) for columns in (numbers, fine))
     used = (fine["status"] == STATUS_NAME[OK]) & (np.isnan(before) == np.isnan(after)).all(axis=0)
     changes = abs(after - before)[:, used]

@@ -28,7 +28,7 @@ from mc_engine.campaign.columns import END_TIME
 from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import ModelError
 from mc_engine.flight import flight
-from mc_engine.flight.kernel import clock_number, usual_width
+from mc_engine.flight.kernel import FINER_STEPS, clock_number, usual_width
 from mc_engine.model.fields import AdaptiveStep, FixedStep, uses_rates
 from mc_engine.model.record import Model, compiled_model
 from mc_engine.model.rules import METHODS
@@ -213,10 +213,11 @@ def _in_numbers(clock: Clock, settings: Any) -> Clock:
     if isinstance(clock, FixedStep):
         n_steps, step, every = flight.grid_of(clock, settings)
         return replace(clock, step=step, until=n_steps * step, control_every=every)
-    until, rtol, period = (clock_number(item, settings) for item in (clock.until, clock.rtol, clock.control_period))
+    given = clock.until, clock.rtol, clock.control_period, clock.longest_step
+    until, rtol, period, longest = (clock_number(item, settings) for item in given)
     if period == np.inf != clock.control_period:  # what the settings give; no model with control is declared with it
         period = 2.0 * until  # nor is there a second sample with this
-    return replace(clock, until=until, rtol=rtol, control_period=period)
+    return replace(clock, until=until, rtol=rtol, control_period=period, longest_step=longest)
 
 
 def _kind(clock: Clock) -> str:
@@ -242,7 +243,7 @@ class _Trials:
         self.period = period if model.control is not None else np.inf
         sizes = [np.nanmax(abs(own[f"end_{state.name}"] * state.si_factor)) for state in model.states]
         self._scales = np.array([size if np.isfinite(size) and size > 0.0 else 1.0 for size in sizes])
-        self._true = self._flown(self._adaptive("dop853", _TIGHT))
+        self._true = self._flown(replace(self._adaptive("dop853", _TIGHT), longest_step=self.flight_s / FINER_STEPS))
         self._least = self._sizes_of_rounding()
         nearly = self._errors(self._flown(self._adaptive("dop853", _NEARLY_AS_TIGHT)))
         self._doubt = {name: _DOUBT * error for name, error in nearly.items()}

@@ -86,7 +86,8 @@ class QuantileRecord(_Record):
 class MetricRecord(_Record):
     """Statistics of a metric over the n_used cases, of n_tried, that have a number.
 
-    integration_change : largest change with half of the step, or a tenth of the tolerances, in the run's first cases
+    integration_change : largest change with half of the step, or a tenth of the tolerances and at least 2000 steps,
+        in the run's first cases
     """
 
     name: str

@@ -92,11 +92,30 @@ def test_what_cannot_be_asked_of_sound_folders_and_urls_is_wrong_usage_and_no_da
         (["compare", "a", "other", "--report", "none/c.html"], "--report none/c.html: there is no folder none"),
         (["compare", "a", "other", "--report", "folder.html"], "--report folder.html: is a folder; name a file"),
         (["export", "a", "--out", "folder.html"], "--out folder.html: is a folder; name a file"),
+        *(
+            (["export", "a", "--out", name], f"--out {name}: is a file of the run a; name another")
+            for name in ("a/manifest.json", "a/journal.jsonl", next((here / "a").glob("cases/*")).relative_to(here))
+        ),
     ]:  # fmt: skip
         answer = call(*words)
         fails_with(2, answer, said)
         assert not answer.stdout
     assert not (here / "whole").exists()
+
+
+def test_a_sample_is_not_written_over_a_table_that_the_campaign_reads(here):
+    own = 'dist = "empirical"\nfile = "pushes.csv"'
+    campaign = CAMPAIGN.replace('dist = "uniform"\nlower = 1.0\nupper = 3.0', own)
+    (here / "cart" / "campaign.toml").write_text(campaign)
+    table = here / "cart" / "pushes.csv"
+    table.write_text("push_n\n1.0\n2.0\n2.5\n")
+    (here / "link.csv").symlink_to(table)
+    for name in ("cart/pushes.csv", "link.csv"):
+        fails_with(
+            2, call("sample", "cart", "--out", name), f"--out {name}: the campaign reads this file; name another"
+        )
+    assert table.read_text() == "push_n\n1.0\n2.0\n2.5\n"
+    assert call("sample", "cart", "--out", "cart/a.csv").exit_code == 0
 
 
 def test_a_run_that_is_complete_is_not_flown_again(here):

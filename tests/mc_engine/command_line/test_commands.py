@@ -114,21 +114,6 @@ def test_a_sample_in_parquet_and_one_in_csv_hold_the_same_numbers(here):
     assert pq.read_schema("a.parquet").field("push_n").metadata[b"unit"] == b"N"
 
 
-def test_a_sample_is_not_written_over_a_table_that_the_campaign_reads(here):
-    own = 'dist = "empirical"\nfile = "pushes.csv"'
-    campaign = CAMPAIGN.replace('dist = "uniform"\nlower = 1.0\nupper = 3.0', own)
-    (here / "cart" / "campaign.toml").write_text(campaign)
-    table = here / "cart" / "pushes.csv"
-    table.write_text("push_n\n1.0\n2.0\n2.5\n")
-    (here / "link.csv").symlink_to(table)
-    for name in ("cart/pushes.csv", "link.csv"):
-        fails_with(
-            2, call("sample", "cart", "--out", name), f"--out {name}: the campaign reads this file; name another"
-        )
-    assert table.read_text() == "push_n\n1.0\n2.0\n2.5\n"
-    assert call("sample", "cart", "--out", "cart/a.csv").exit_code == 0
-
-
 def test_plan_gives_the_classic_sample_sizes(here):
     lines = call("plan", "--share", "0.9", "--confidence", "0.9").stdout.splitlines()
     assert [line.split()[:2] for line in lines[3:5]] == [["0", "22"], ["1", "38"]]

@@ -271,8 +271,8 @@ assert fly(model, inputs, np.zeros(1, dtype=int), 1, folder=Path("case"), width=
 def test_a_finer_clock_has_half_of_the_steps_or_a_tenth_of_the_tolerances_and_the_same_samples():
     settings = SimpleNamespace(step=0.3, tolerance=1e-6)
     assert grid_of(FixedStep("step", 2.0, control_every=5), settings) == (7, 0.3, 5)
-    assert grid_of(finer(FixedStep("step", 2.0, control_every=5)), settings) == (14, 0.15, 10)
-    clock = finer(AdaptiveStep(10.0, "tolerance", (1e-3, 1e-6), control_period=0.5))
+    assert grid_of(finer(FixedStep("step", 2.0, control_every=5), 2.0), settings) == (14, 0.15, 10)
+    clock = finer(AdaptiveStep(10.0, "tolerance", (1e-3, 1e-6), control_period=0.5), 10.0)
     assert clock_number(clock.rtol, settings) == pytest.approx(1e-7)
     assert clock.atol == pytest.approx((1e-4, 1e-7))
     assert (clock.until, clock.control_period) == (10.0, 0.5)

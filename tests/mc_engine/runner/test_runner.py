@@ -222,8 +222,8 @@ def test_a_run_ends_with_how_much_half_of_the_step_changes_its_first_cases(flown
 def test_a_case_whose_metric_is_there_with_one_step_alone_is_not_used(flown, monkeypatch):
     given = CompiledFlyer.fly_finer
 
-    def without(self, inputs, noise):
-        by, columns = given(self, inputs, noise)
+    def without(self, inputs, noise, flight_s):
+        by, columns = given(self, inputs, noise, flight_s)
         columns["apogee_time_s"][3] = np.nan
         columns["top_speed_m_s"][3] = 1e9
         return by, columns
