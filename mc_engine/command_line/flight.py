@@ -207,15 +207,7 @@ def finish(
     campaign: str | None = None,
 ) -> None:
     """Write the reports of a run, print the summary, and set the exit status according to --judge and --max-failed."""
-    from mc_engine.runner.summary import (
-        analyses_line,
-        case_line,
-        failed_cases,
-        failure_line,
-        nominal_line,
-        outcomes,
-        verdict_line,
-    )
+    from mc_engine.runner import summary
 
     shard = store.manifest.get("shard")
     if url is not None or not (no_report or shard):
@@ -227,26 +219,28 @@ def finish(
         return
     reports = [] if no_report else write_reports(store.path, ("html", "pdf"))
     typer.echo(f"run          {store.path}")
-    typer.echo(f"cases        {case_line(store)}")
-    if nominal := nominal_line(store):
+    typer.echo(f"cases        {summary.case_line(store)}")
+    if nominal := summary.nominal_line(store):
         typer.echo(f"nominal      {nominal}")
-    if analyses := analyses_line(store):
+    if analyses := summary.analyses_line(store):
         typer.echo(f"analyses     {analyses}")
-    judged, joint = outcomes(store)
+    judged, joint = summary.outcomes(store)
     for verdict in (*judged, joint) if joint is not None else judged:
-        typer.echo(f"requirement  {verdict_line(verdict, store.units)}")
+        typer.echo(f"requirement  {summary.verdict_line(verdict, store.units)}")
+    if coarse := summary.integration_line(store):
+        typer.echo(f"integration  {coarse}")
     for report_path in reports:
         typer.echo(f"report       {report_path}")
     if url is not None:
         echo_publication(store.path, url)
     counts = store.status_counts()
-    failed = failed_cases(counts)
+    failed = summary.failed_cases(counts)
     if failed == sum(counts.values()):
         named = shell_word(campaign or store.path / "campaign.toml")
         look = f"`mc-engine check {named}` looks for the reason"
         why = "the column `reason` of its cases says why" if store.manifest.get("imported") else look
         typer.echo(f"no case completed; {why}", err=True)
-    elif line := failure_line(store):
+    elif line := summary.failure_line(store):
         typer.echo(line)
     _judge_failures(failed, max_failed)
     if judge and any(verdict.outcome != "pass" for verdict in judged):

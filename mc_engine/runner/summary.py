@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from mc_engine.statistics.streaming import Passes, Streamed
 
 PARTS_AHEAD = 2
+_ROUNDED = 1e-6  # of a metric: what finer steps may change where it does not vary
 _DIGITS, _ALL_DIGITS = 8, 17  # of a metric: as a rule, and of a double
 
 
@@ -140,6 +141,25 @@ def analyses_line(store: Store) -> str:
     else:
         history = f"extended from {begun:,} to {store.n_cases:,} cases"
     return f"{history}; the verdicts hold at every number of cases at once"
+
+
+def integration_line(store: Store) -> str:
+    """That finer steps change a metric with a requirement by more than its spread in the first part; else empty."""
+    import numpy as np
+
+    found = next((entry.facts.get("integration") or {} for entry in reversed(store.notes("finished"))), {})
+    changes, judged = found.get("changes", {}), _judged_metrics(store.manifest.get("requirements", []))
+    metrics = [name for name in judged if name in changes]
+    if not metrics:
+        return ""
+    columns = [column for column in store.columns if column.name in ("status", *metrics)]
+    coarse = []
+    for name, numbers in _metrics_of(store, store.parts[0], columns, metrics)[1].items():
+        finite = numbers[np.isfinite(numbers)]
+        if finite.size and changes[name] > finite.std() + _ROUNDED * abs(finite).max():
+            coarse.append(name)
+    told = f"with {found.get('by')}, {', '.join(coarse)} would change by more than a standard deviation"
+    return told if coarse else ""
 
 
 def verdict_line(verdict: "Verdict", units: Mapping[str, str]) -> str:

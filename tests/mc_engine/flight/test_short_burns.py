@@ -11,6 +11,7 @@ from mc_engine.flight.flight import chosen_cases, chosen_history
 from mc_engine.flight.kernel import finer
 from mc_engine.model import AdaptiveStep
 from mc_engine.runner import runner
+from mc_engine.runner.summary import integration_line
 from reports.run.flown import Flown
 from reports.sections.headline import warnings
 
@@ -131,10 +132,15 @@ def test_check_tells_of_a_burn_that_steps_pass_over_and_not_of_one_by_events(by_
     assert faults(replace(by_time, model=short)) == []
 
 
-def test_the_report_of_a_run_tells_of_what_its_steps_have_passed_over(by_time, tmp_path):
+def test_a_run_and_its_report_tell_of_what_steps_have_passed_over(by_time, by_events, tmp_path):
     run = runner.run(load_campaign(by_time.directory / "campaign.toml", cases=2000), tmp_path / "run")
     [warning] = [sentence for sentence in warnings(Flown(run, "")) if "integration" in sentence]
     assert warning.startswith("With a tenth of the tolerances and at least 2,000 steps, ")
+    assert integration_line(run).endswith(
+        "at least 2,000 steps, last_v_m_s would change by more than a standard deviation"
+    )
+    sound = runner.run(load_campaign(by_events.directory / "campaign.toml", cases=2000), tmp_path / "sound")
+    assert integration_line(sound) == ""
 
 
 def test_a_longest_step_may_be_a_setting_and_a_finer_clock_keeps_a_shorter_one():
