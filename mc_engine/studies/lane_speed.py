@@ -243,9 +243,9 @@ class _Trials:
         self.period = period if model.control is not None else np.inf
         sizes = [np.nanmax(abs(own[f"end_{state.name}"] * state.si_factor)) for state in model.states]
         self._scales = np.array([size if np.isfinite(size) and size > 0.0 else 1.0 for size in sizes])
-        self._true = self._flown(replace(self._adaptive("dop853", _TIGHT), longest_step=self.flight_s / FINER_STEPS))
+        self._true = self._flown(self._reference(_TIGHT))
         self._least = self._sizes_of_rounding()
-        nearly = self._errors(self._flown(self._adaptive("dop853", _NEARLY_AS_TIGHT)))
+        nearly = self._errors(self._flown(self._reference(_NEARLY_AS_TIGHT)))
         self._doubt = {name: _DOUBT * error for name, error in nearly.items()}
         self.left_out = self._leave_out(self._errors(own))
 
@@ -291,6 +291,12 @@ class _Trials:
             return replace(self.own, rtol=rtol, atol=tuple(atol), method=method)
         rtol, *atol = (float(f"{tolerance * scale:.1e}") for scale in (1.0, *self._scales))
         return AdaptiveStep(self.own.until, rtol, tuple(atol), self.period, method)
+
+    def _reference(self, tolerance: float) -> AdaptiveStep:
+        """A clock whose steps are also short enough for what longer ones pass over."""
+        clock = self._adaptive("dop853", tolerance)
+        longest = min(self.flight_s / FINER_STEPS, float(clock.longest_step))
+        return replace(clock, longest_step=longest, attempts=clock.attempts + 10 * FINER_STEPS)
 
     def _sizes_of_rounding(self) -> dict[str, float]:
         """By quantity, such as length, how small a metric is in SI that is but the rounding of larger numbers."""
