@@ -251,7 +251,7 @@ class AdaptiveStep:
     method : str, "dop853" (order 8) or "dp54" (order 5)
     attempts : int, a case that needs more steps, accepted and rejected ones together, ends as step-limit; at most 1e9
     first_step : float, length [s] of the first attempt; with 0 the engine chooses it
-    longest_step : float or str, limit of the length of a step [s].  A step does not see what acts for a shorter time
+    longest_step : float or str, limit of the length of a step [s].  A step may not see what acts for a shorter time
         than it takes, such as a burn between two times in `rhs`.  Let an event of the time begin and end a burn, or
         limit the steps to its length; `mc-engine check` and the report of a run tell of what steps have passed over.
 
