@@ -24,7 +24,7 @@ from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError,
 from mc_engine.interruption import INTERRUPTED, interruption_message, signalled, under_way
 from mc_engine.numbers_in_text import LARGEST_WHOLE, counted, is_real, is_whole
 from mc_engine.shell_words import shell_word
-from mc_engine.store.run_files import NO_TEXT, kind_of, readable
+from mc_engine.store.run_files import JOURNAL, NO_TEXT, kind_of, readable
 from mc_engine.store.urls import is_url, store_url
 from mc_engine.unforeseen import UNFORESEEN, unforeseen
 
@@ -281,7 +281,7 @@ def refuse_unwritable_file(option: str, path: Path) -> None:
     if not os.access(path.parent, os.W_OK):
         leave(USAGE, f"{option} {path}: this user may not write to the folder {path.parent}; name a file elsewhere")
     file = path.resolve()
-    inside = next((folder for folder in file.parents if kind_of(folder)), None)
+    inside = next((folder for folder in file.parents if (folder / JOURNAL).is_file()), None)
     own = file.parent != inside or file.stem == "report" or file.suffix in _RECORDED
     if inside is not None and path.exists() and own:
         leave(USAGE, f"{option} {path}: is a file of the {kind_of(inside)} {inside.name}; name another")

@@ -103,6 +103,14 @@ def test_what_cannot_be_asked_of_sound_folders_and_urls_is_wrong_usage_and_no_da
     assert not (here / "whole").exists()
 
 
+def test_a_file_beside_a_manifest_of_something_else_is_written_again(here):
+    small_store(here / "a")
+    (here / "manifest.json").write_text("{}")  # of a project of another kind
+    (here / "out").mkdir()
+    for _ in range(2):
+        assert call("export", "a", "--out", "out/ends.csv").exit_code == 0
+
+
 def test_a_sample_is_not_written_over_a_table_that_the_campaign_reads(here):
     own = 'dist = "empirical"\nfile = "pushes.csv"'
     campaign = CAMPAIGN.replace('dist = "uniform"\nlower = 1.0\nupper = 3.0', own)

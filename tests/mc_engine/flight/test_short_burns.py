@@ -1,11 +1,13 @@
 """A burn between two times, far shorter than the steps of the coast around it: it is not lost without a word."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mc_engine.campaign.loading import load_campaign
+from mc_engine.errors import CampaignError
 from mc_engine.flight.contract_flight import faults
 from mc_engine.flight.flight import chosen_cases, chosen_history
 from mc_engine.flight.kernel import finer
@@ -61,8 +63,7 @@ def observe(s):
 
 
 MODEL = model(name="push", title="A push", inputs=Inputs, states=State, outputs=Outputs, metrics=Metrics,
-              memory=Memory, clock=AdaptiveStep(until=2000.0), initial=initial, rhs=rhs, observe=observe,
-              switch=switch, events={EVENTS})
+              memory=Memory, clock=AdaptiveStep(until=2000.0), initial=initial, rhs=rhs, observe=observe, EVENTS)
 '''
 CAMPAIGN = """[campaign]
 title = "A push"
@@ -79,16 +80,19 @@ push_m_s2 = { dist = "normal", sigma = 0.01 }
 speed = { metric = "last_v_m_s", at_most = 100.0, share = 0.5, confidence = 0.9 }
 """
 BY_TIME = "where((t >= p.start) & (t < p.start + 2.0), 1.0, 0.0)", ""
-BY_EVENTS = "m.on", '"begin": Event(begin, "rising", "switch"), "cease": Event(cease, "rising", "switch")'
+BY_EVENTS = (
+    "m.on",
+    'switch=switch, events={"begin": Event(begin, "rising", "switch"), "cease": Event(cease, "rising", "switch")}',
+)
 
 
-def push(folder, on, events):
+def push(folder, on, events, clock="AdaptiveStep(until=2000.0)"):
     folder.mkdir()
-    text = MODEL.replace("= ON", f"= {on}").replace("{EVENTS}", f"{{{events}}}")
-    if not events:
-        text = text.replace("              switch=switch, events={})", ")").replace(
-            "observe=observe,\n)", "observe=observe)"
-        )
+    text = (
+        MODEL.replace("= ON", f"= {on}")
+        .replace("EVENTS", events)
+        .replace("clock=AdaptiveStep(until=2000.0)", f"clock={clock}")
+    )
     (folder / "model.py").write_text(text)
     (folder / "campaign.toml").write_text(CAMPAIGN)
     return load_campaign(folder / "campaign.toml")
@@ -125,8 +129,8 @@ def test_short_steps_see_the_burn_that_long_ones_pass_over(by_time, by_events):
 
 def test_check_tells_of_a_burn_that_steps_pass_over_and_not_of_one_by_events(by_time, by_events):
     [sentence] = faults(by_time)
-    assert sentence.startswith("steps pass over something: ")
-    assert "of the first 32 cases end elsewhere with steps of at most 1 s; " in sentence
+    assert sentence.startswith("steps are too long: ")
+    assert "of the first 32 cases end elsewhere with a tenth of the tolerances and steps of at most 1 s; " in sentence
     assert faults(by_events) == []
     short = replace(by_time.model, clock=AdaptiveStep(until=2000.0, longest_step=1.5))
     assert faults(replace(by_time, model=short)) == []
@@ -144,6 +148,12 @@ def test_a_run_and_its_report_tell_of_what_steps_have_passed_over(by_time, by_ev
 
 
 def test_a_longest_step_may_be_a_setting_and_a_finer_clock_keeps_a_shorter_one():
-    clock = AdaptiveStep(until=100.0, longest_step=1e-3)
-    assert finer(clock, 100.0).longest_step(None) == 1e-3
-    assert finer(replace(clock, longest_step=np.inf), 100.0).longest_step(None) == 0.05
+    settings, clock = SimpleNamespace(step=1e-3), AdaptiveStep(until=100.0, longest_step="step")
+    assert finer(clock, 100.0).longest_step(settings) == 1e-3
+    assert finer(replace(clock, longest_step=np.inf), 100.0).longest_step(settings) == 0.05
+
+
+@pytest.mark.parametrize("longest", ["0.0", "-1.0", "'no_such_setting'"])
+def test_a_longest_step_that_is_none_is_refused(tmp_path, longest):
+    with pytest.raises(CampaignError, match="longest_step"):
+        push(tmp_path / "push", *BY_TIME, clock=f"AdaptiveStep(until=2000.0, longest_step={longest})")
