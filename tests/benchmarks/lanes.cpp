@@ -1,4 +1,5 @@
-// Hand-written lanes: eight cases in a vector, classical Runge-Kutta, for the low orbit and the flexible satellite.
+// Hand-written lanes: eight cases in a vector with AVX-512, four with AVX2; classical Runge-Kutta, for the low orbit and
+// the flexible satellite.
 //
 //     g++ -O3 -march=native -ffast-math -shared -fPIC -pthread lanes.cpp -o lanes.so
 //
@@ -10,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-#if defined(__AVX512F__)
+#if defined(__AVX2__)
 #include <immintrin.h>
 #endif
 
@@ -18,7 +19,11 @@ namespace {
 
 #define ALWAYS inline __attribute__((always_inline))
 
+#if defined(__AVX512F__) || !defined(__AVX2__)
 constexpr int W = 8;
+#else
+constexpr int W = 4;
+#endif
 typedef double V __attribute__((vector_size(8 * W)));
 typedef long long I __attribute__((vector_size(8 * W)));
 
@@ -31,6 +36,15 @@ ALWAYS V sqrt(V x) { return (V)_mm512_sqrt_pd((__m512d)x); }
 ALWAYS V round(V x) { return (V)_mm512_roundscale_pd((__m512d)x, 0); }
 ALWAYS V scale(V x, V n) { return (V)_mm512_scalef_pd((__m512d)x, (__m512d)n); }
 ALWAYS V least(V x, V y) { return (V)_mm512_min_pd((__m512d)x, (__m512d)y); }
+#elif defined(__AVX2__)
+ALWAYS V sqrt(V x) { return (V)_mm256_sqrt_pd((__m256d)x); }
+ALWAYS V round(V x) { return (V)_mm256_round_pd((__m256d)x, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
+ALWAYS V least(V x, V y) { return (V)_mm256_min_pd((__m256d)x, (__m256d)y); }
+// x 2^n by the bits of the exponent; 2^n must be a normal number
+ALWAYS V scale(V x, V n) {
+    const __m256i bits = _mm256_cvtepi32_epi64(_mm256_cvtpd_epi32((__m256d)n));
+    return (V)_mm256_castsi256_pd(_mm256_slli_epi64(_mm256_add_epi64(bits, _mm256_set1_epi64x(1023)), 52)) * x;
+}
 #else
 ALWAYS V sqrt(V x) { for (int i = 0; i < W; i++) x[i] = std::sqrt(x[i]); return x; }
 ALWAYS V round(V x) { for (int i = 0; i < W; i++) x[i] = std::nearbyint(x[i]); return x; }
@@ -170,6 +184,7 @@ template <class Problem> void fly(const double* p, double* out, long n, long ste
 
 }  // namespace
 
+extern "C" int lanes() { return W; }
 extern "C" void orbit(const double* p, double* out, long n, long steps, double h, int threads) {
     fly<Orbit>(p, out, n, steps, h, threads);
 }

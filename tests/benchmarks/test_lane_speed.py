@@ -21,7 +21,7 @@ WITH_PULSES = 0.93
 
 
 def least_ratio():
-    """What the processor allows: eight doubles of AVX-512, which Zen 4 computes in two halves, or four of AVX2."""
+    """What the processor allows: eight doubles of AVX-512, or four of AVX2; Zen 4 and Zen 1 compute them in halves."""
     features = binding.get_host_cpu_features()
     if features.get("avx512f"):
         # Zen 4, quiet: 5.1 to 7.1, the flexible satellite 4.4.  Emerald Rapids, quiet: 5.3 to 6.0, because Intel's take
@@ -30,7 +30,8 @@ def least_ratio():
         name = binding.get_host_cpu_name()
         return 3.5 if name == "znver4" else 7.0 if name.startswith("znver") else 4.5
     if features.get("avx2"):
-        return 3.0  # Zen 3, quiet: 3.7 to 4.2
+        # Zen 3, quiet: 3.7 to 4.2.  Zen 1: 2.4 to 3.3
+        return 2.0 if binding.get_host_cpu_name() == "znver1" else 3.0
     return None
 
 

@@ -69,4 +69,5 @@ def _entrant(problem: Problem, compiler: str, step: float) -> Entrant:
 
         return fly
 
-    return Entrant("C++ by hand", f"RK4, 8 lanes, {version(compiler)}", problem, "step", (step,), build)
+    form = f"RK4, {library(compiler).lanes()} lanes, {version(compiler)}"
+    return Entrant("C++ by hand", form, problem, "step", (step,), build)
