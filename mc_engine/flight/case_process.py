@@ -76,9 +76,8 @@ class CaseProcess:
             self._connection.send(setup)
             fault = self._connection.recv() if self._connection.poll(START_S) else f"took longer than {START_S:.0f} s"
         except (EOFError, OSError):
-            code = self._process.wait()
-            fault = f"{how_it_ended(code)}{_crash_site(end_of(self.work / STDERR))}"
-            kind = TerminatedAtStart if code == -signal.SIGTERM else ModelError
+            fault = self._how_it_ended()
+            kind = TerminatedAtStart if self._process.returncode == -signal.SIGTERM else ModelError
         if fault:
             self.end()
             raise kind(f"{setup.reference}: {fault}")
@@ -115,8 +114,19 @@ class CaseProcess:
         except (EOFError, ConnectionError):
             if _ending.is_set():
                 threading.Event().wait()  # without end, see `end_all`
-            code = self._process.wait()
-            raise CaseEnded(CRASHED, f"{how_it_ended(code)}{_crash_site(end_of(self.work / STDERR))}") from None
+            raise CaseEnded(CRASHED, self._how_it_ended()) from None
+
+    def _how_it_ended(self) -> str:
+        """How the process ended that has closed its end of the connection, as a sentence; one that lives on is ended.
+
+        A case may close files that are not its own, and leave threads for which Python waits.
+        """
+        try:
+            code = self._process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            self._kill()
+            return "closed the connection to the engine, and did not end"
+        return f"{how_it_ended(code)}{_crash_site(end_of(self.work / STDERR))}"
 
     def _wait(self, limit_s: float | None, stopped: Callable[[], bool]) -> None:
         begin = time.monotonic()

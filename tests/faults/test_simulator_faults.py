@@ -40,6 +40,12 @@ PYTHON_FAULTS = {
         "which is no number",
     ),
     "refused": ("raise Refuse('too heavy')", "refused", "too heavy"),
+    "closed": (
+        "import os, threading\n    threading.Thread(target=__import__('time').sleep, args=(30.0,)).start()\n"
+        "    os.closerange(3, 256)",
+        "crashed",
+        "closed the connection to the engine, and did not end",
+    ),
     "loud": ("print('x' * 5_000_000)\n    raise ValueError('loud')", "crashed", "ValueError: loud"),
 }
 WRITE = 'file = fopen(argv[2], "w"); fprintf(file, '
