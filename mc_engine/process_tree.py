@@ -139,6 +139,8 @@ def die_with_parent(parent: int, end: Callable[[int, Any], None] | None = None) 
             signal.signal(_PARENT_DIED, end)
         ctypes.CDLL(None).prctl(_SET_PARENT_SIGNAL, signal.SIGKILL if end is None else _PARENT_DIED)
         if os.getppid() != parent:  # it died before
+            if end is not None:
+                end(_PARENT_DIED, None)
             os._exit(1)
 
 

@@ -310,6 +310,18 @@ def test_children_left_behind_are_ended(tmp_path, faulty):
     assert running("4321") == []
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere it has no guard")
+def test_a_process_that_begins_after_its_engine_has_died_removes_its_folder(tmp_path):
+    (tmp_path / "work").mkdir()
+    connection, other = os.pipe()
+    words = ["mc_engine.flight.case_worker", str(connection), str(tmp_path / "work"), "0"]  # no process has number 0
+    begun = subprocess.Popen([sys.executable, "-m", "mc_engine.process_tree", *words], pass_fds=(connection,))
+    os.close(connection)
+    assert begun.wait(60) == 1
+    assert not (tmp_path / "work").exists()
+    os.close(other)
+
+
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere a function ends its own programs")
 def test_a_killed_engine_leaves_neither_the_programs_of_a_function_nor_its_folder(tmp_path, monkeypatch):
     fault = "import ctypes, subprocess\nsubprocess.Popen(['sleep', '4323'], start_new_session=True)\n"
