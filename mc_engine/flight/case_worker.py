@@ -25,7 +25,7 @@ import numpy as np
 from mc_engine.errors import EngineError, StoreError
 from mc_engine.flight.flyer import NOMINAL_NOISE
 from mc_engine.flight.program_flight import Flown, ProgramFlight, flown
-from mc_engine.model.faults import fault_of
+from mc_engine.model.faults import fault_of, text_of
 from mc_engine.model.simulator import Refuse, Simulator, in_time, load_simulator, numeric
 from mc_engine.model.sources import leave_importable
 from mc_engine.process_tree import adopt_orphans, die_with_parent, end_children, hold_when_terminated, own_children
@@ -213,13 +213,13 @@ def _loaded(setup: Setup, work: Path) -> Simulator:
 def _failed(error: BaseException, reference: str) -> Flown:
     """How a case ended whose function raised an error."""
     if isinstance(error, Refuse):
-        return flown(REFUSED, str(error) or "refused without a reason")
+        return flown(REFUSED, text_of(error) or "refused without a reason")
     if isinstance(error, MemoryError):
         return flown(MEMORY_LIMIT, "needed more memory than the simulator may have")
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         raise error
     if not isinstance(error, Exception):
-        return flown(CRASHED, f"{reference}: ends its process by {type(error).__name__}({error})")
+        return flown(CRASHED, f"{reference}: ends its process by {type(error).__name__}({text_of(error)})")
     return flown(CRASHED, fault_of(error, reference))
 
 

@@ -242,7 +242,15 @@ def _place_and_cause(error: Exception) -> tuple[str, str]:
     """(place, or nothing; the error in one line)."""
     if _of_the_compiler(error):
         return _compiler_fault(re.sub(r"\x1b\[[0-9;]*m", "", str(error)))  # without colours
-    return place_in_model(error), " ".join(f"{type(error).__name__}: {error}".split())
+    return place_in_model(error), " ".join(f"{type(error).__name__}: {text_of(error)}".split())
+
+
+def text_of(error: BaseException) -> str:
+    """The text of an error, whose class may be the user's and fail to give one."""
+    try:
+        return str(error)
+    except Exception as fault:
+        return f"its text cannot be given, as its __str__ raises {type(fault).__name__}"
 
 
 def _of_the_compiler(error: Exception) -> bool:

@@ -40,6 +40,11 @@ PYTHON_FAULTS = {
         "which is no number",
     ),
     "refused": ("raise Refuse('too heavy')", "refused", "too heavy"),
+    "no text": (
+        "raise type('Odd', (Exception,), {'__str__': lambda self: self.lost})",
+        "crashed",
+        "Odd: its text cannot be given, as its __str__ raises AttributeError",
+    ),
     "closed": (
         "import os, threading\n    threading.Thread(target=__import__('time').sleep, args=(30.0,)).start()\n"
         "    os.closerange(3, 256)",
