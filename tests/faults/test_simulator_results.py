@@ -143,6 +143,19 @@ def test_check_says_where_a_batch_has_other_results_than_its_cases_alone(tmp_pat
     assert ("batch" in remarks) == bool(said)
 
 
+OF_A_PROCESS = {
+    "first case": ("FIRST = {}", "inputs['mass_kg'] = FIRST.setdefault('mass', inputs['mass_kg'])"),
+    "drawn once": ("import numpy\nMASS = numpy.random.default_rng().uniform(9.0, 10.0)", "inputs['mass_kg'] = MASS"),
+}
+
+
+@pytest.mark.parametrize(("imports", "fault"), OF_A_PROCESS.values(), ids=OF_A_PROCESS)
+def test_check_says_where_results_depend_on_the_process_of_a_case(tmp_path, imports, fault):
+    file = python_campaign(tmp_path / "ball", cases=4, fault=fault, imports=imports, options="slots=1,")
+    remarks = flyer_of(load_campaign(file)).remarks()
+    assert remarks[0].startswith("not deterministic: fall_time_s, impact_speed_m_s differ between two flights")
+
+
 @pytest.mark.parametrize("options", ["", "batch=True,"], ids=["case", "batch"])
 def test_a_copy_of_the_process_that_a_case_begins_gives_no_results(tmp_path, options):
     fork = """

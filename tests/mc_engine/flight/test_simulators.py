@@ -71,7 +71,7 @@ def test_check_tells_what_a_simulator_lacks(tmp_path, monkeypatch):
     said = CliRunner().invoke(app, ["check", str(file)])
     assert said.exit_code == 0
     assert "has not ended after 0.1 s; Ctrl-C ends it, and `time_limit_s`" in said.stderr
-    assert "differ between two flights of a case; draw from case.rng or case.seed, or `replay` finds" in said.stdout
+    assert "differ between two flights of a case; draw from case.rng or case.seed, and keep nothing" in said.stdout
     assert "no time histories are saved, because the simulator declares no outputs" in said.stdout
     assert "not saved, as no declared outputs: the columns speed_m_s of the history" in said.stdout
     assert re.search(r" s a case, 0\.[3-9]\d* s for 1 case on ", said.stdout)  # which no second worker shares
