@@ -65,7 +65,7 @@ _FEW = 3.0  # looks at an event with its width; then the width grows
 _CHORDS = 8.0  # then every other look halves the bracket, and the width stays: else it would be met far from the zero
 _CLOSED = 2e-15  # of time and length: the width at which the bracket of an event is closed
 _CREST = 1e-7  # of a step: the same for a peak, which is flat and differs by the square of this
-_AT_SAMPLE = 1e-12  # of the time: an event at a sample may be found so far behind it
+_AT_SAMPLE = 1e-12  # of the time: an event may be found so far behind a sample; a sample so near the end is not taken
 _NEVER, _NONE, _NAN = 1e300, 1e-300, float("nan")
 
 
@@ -284,7 +284,8 @@ def _fly(
         else:
             flying = active > 0.5
             sampled = zero + f.samples(here.t, here.s, here.m, p, o) > 0.5
-            target = minimum(clock.until + zero, where(sampled, sample * clock.period, _NEVER))
+            due_sample = where(sampled, sample * clock.period, _NEVER)
+            target = where(due_sample < (1.0 - _AT_SAMPLE) * clock.until, due_sample, clock.until)
             room = target - here.t
             length = minimum(where(room <= 1.001 * h, room, h), limit)
             landing = (not closing) & (length == room)
@@ -369,8 +370,7 @@ def _fly(
             here = Instant(here.t, s, m, here.k, here.senses, here.rates, here.values)
             sample = where(sampling, sample + 1.0, sample)
             last_ideal = where(altered, _NONE, last_ideal)
-        done = ended | stuck | capped
-        new = flying & (not flying)
+        done, new = ended | stuck | capped, flying & (not flying)
         if history.shape[0] > 0:
             shown = (recorded & (closed | sampling)) | done
             record_change(f, history, rows, shown, closed, here.t, here.s, here.m, p, o)

@@ -118,6 +118,13 @@ def test_the_control_is_sampled_at_its_times_with_its_own_draws(wave):
     assert longer["push_m_s2"][0] == longer["push_m_s2"][1] != longer["push_m_s2"][2]
 
 
+@pytest.mark.parametrize(("period", "until", "samples"), [(0.7, 2.1, 3), (0.3, 3.6, 12), (0.1, 0.3, 3)])
+def test_no_sample_is_taken_at_the_end_whichever_way_its_time_is_rounded(period, until, samples):
+    """As on a fixed grid.  In double precision 3 x 0.7 is below 2.1, 12 x 0.3 below 3.6, and 3 x 0.1 above 0.3."""
+    got = flown(replace(OSCILLATOR, clock=AdaptiveStep(until, control_period=period)))
+    assert (got["samples"][0], got["end_time_s"][0]) == (samples, until)
+
+
 def test_a_flight_with_samples_and_no_event_has_the_same_bits_interpreted():
     sampled = replace(OSCILLATOR, clock=AdaptiveStep(until=3.0, control_period=0.7))
     columns = flown(sampled, case_ids=[5], noise_m_s2=0.1, gain_1_s=0.2)
