@@ -103,7 +103,14 @@ class Contributions:
 
     def acting(self, metric: str) -> list[str]:
         """The inputs that surely contribute to a metric, alone or in their group, the strongest first."""
-        sure = [row.input for row in self.by_metric.get(metric, ()) if row.surely_acts]
+        return self._acting(self.by_metric.get(metric, ()))
+
+    def strongest(self, metric: str) -> list[str]:
+        """The inputs of the strongest contributor to a metric; none where it is the random draws of the flights."""
+        return self._acting(self.by_metric.get(metric, ())[:1])
+
+    def _acting(self, rows: tuple[Contributor, ...]) -> list[str]:
+        sure = [row.input for row in rows if row.surely_acts]
         return [name for contributor in sure for name in self.members.get(contributor, [contributor])]
 
     def rows(self) -> Iterator[Contributor]:

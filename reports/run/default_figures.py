@@ -21,7 +21,7 @@ def history_figures(flown: Flown) -> list[HistoryFigure]:
 
 
 def scatter_figures(flown: Flown) -> list[ScatterFigure]:
-    """The model's scatter plots; of a model without any, the metrics that matter over their strongest contributors.
+    """The model's scatter plots; of a model without any, the metrics that matter over their strongest inputs.
 
     Without an input that surely contributes to a metric, over the one that seems to.
     """
@@ -33,10 +33,11 @@ def _suggested(flown: Flown) -> Iterator[ScatterFigure]:
     for metric in flown.key_metrics:
         if flown.summaries[metric].constant or not flown.summaries[metric].n_used:
             continue
-        acting = [] if flown.contributions is None else flown.contributions.acting(metric)
+        found = flown.contributions
+        acting, strongest = ([], []) if found is None else (found.acting(metric), found.strongest(metric))
         for name in [*acting, *(contributor.name for contributor in flown.contributors(metric))]:
             if np.isfinite(flown.values(name)).any():
-                what = "its strongest contributor, " if name in acting else ""
+                what = "its strongest contributor, " if name in strongest else ""
                 title = f"{flown.words(metric)} over {what}{flown.words(name)}"
                 yield ScatterFigure(name, metric, title[:1].upper() + title[1:])
                 break

@@ -20,6 +20,7 @@ from reports.formats.json_data import render_json
 from reports.formats.markdown import render_markdown
 from reports.run.chosen_units import spread_text
 from reports.run.contributions import Contributions, Contributor, _ranked
+from reports.run.default_figures import scatter_figures
 from reports.run.flown import Flown
 
 MODEL = Path(__file__).parents[2] / "mc_engine" / "runner" / "contributions" / "model.py"
@@ -66,6 +67,20 @@ def test_effects_and_their_intervals_are_possible_ones(tmp_path):
     for row in rows:
         if (row["metric"], row["input"]) in below:
             assert row["first"] == 0.0 < row["first_interval"][1]
+
+
+def test_an_input_is_not_called_the_strongest_contributor_where_the_random_draws_are_stronger():
+    draws = Contributor("propellant_kg", "random draws", 1.0, 0.99, (1.0, 1.0), (0.95, 1.0))
+    ve = Contributor("propellant_kg", "ve_pct", 0.1, 0.2, (0.05, 0.15), (0.15, 0.25))
+    run, titles = synthetic_run(300, failed=0), []
+    run.manifest["figures"] = []
+    for rows in ((draws, ve), (ve, draws)):
+        flown = Flown(run, "run")
+        flown.contributions = Contributions(
+            {"propellant_kg": rows}, 300, {}, {}, {"random draws": [], "ve_pct": ["ve_pct"]}
+        )
+        titles.append(next(figure.title for figure in scatter_figures(flown) if figure.y == "propellant_kg"))
+    assert titles == ["Propellant over ve", "Propellant over its strongest contributor, ve"]
 
 
 def test_the_note_bounds_the_columns_that_are_bounded_and_no_others():
