@@ -146,7 +146,7 @@ def _failed_inputs(limit: LimitState, estimate: RareEvent) -> tuple[list[dict[st
     probable failed case on the opposite side of the origin is added, if there is one.
     """
     failed = np.flatnonzero(estimate.cases.failed)
-    if not failed.size:
+    if not estimate.cases.weight[failed].any():  # those of the levels before importance sampling count for nothing
         return [], []
     u, weight = estimate.cases.u[failed], estimate.cases.weight[failed]
     nearest = int(np.argmin((u * u).sum(axis=1)))

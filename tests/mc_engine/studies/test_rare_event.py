@@ -20,8 +20,9 @@ from mc_engine.physics.constants import EQUATORIAL_RADIUS, MU_EARTH
 from mc_engine.sampling.correlation import normal_correlation
 from mc_engine.sampling.distributions import Discrete, Empirical, Normal
 from mc_engine.section import ReportSection
+from mc_engine.statistics.rare_events import Evaluated, RareEvent
 from mc_engine.studies.limit_state import LimitState, chosen_requirement
-from mc_engine.studies.rare_event import METHODS, estimate_rare_event
+from mc_engine.studies.rare_event import METHODS, _failed_inputs, estimate_rare_event
 from mc_engine.studies.rare_event_folder import open_rare_event, probability_words, rare_event_lines
 
 MINIMAL = SHIPPED / "minimal"
@@ -168,6 +169,15 @@ def with_pitch(campaign, distribution):
     """The campaign with another distribution of its second input."""
     size, pitch = campaign.dispersions
     return replace(campaign, dispersions=(size, replace(pitch, distribution=distribution)))
+
+
+def test_failed_cases_of_earlier_levels_alone_describe_no_failures():
+    """As where the noise of the flight decides: a plain case failed, and none that importance sampling drew."""
+    limit = LimitState(minimal(), chosen_requirement(minimal(), None), 1)
+    u, level = np.zeros((2, len(limit.names))), np.arange(2)
+    cases = Evaluated(u, np.array([-1.0, 1.0]), level, level, np.array([0.0, 1.0]))
+    event = RareEvent("cross-entropy", 0.0, 0.0, 0.1, 0.9, math.inf, (), cases, ())
+    assert _failed_inputs(limit, event) == ([], [])
 
 
 def test_inputs_that_cannot_be_led_to_failure_are_refused_in_a_sentence():
