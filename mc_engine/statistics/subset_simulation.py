@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mc_engine.sampling.streams import stream
+from mc_engine.statistics.binomial import clopper_pearson
 from mc_engine.statistics.rare_events import (
     FRESH,
     Flights,
@@ -39,6 +40,7 @@ _WANTED_ACCEPTANCE = 0.44  # Papaioannou et al. (2015), section 4.2
 _FIRST_SCALE = 0.6
 _KEEPS_NOISE = 0.5  # share of the steps that leave the noise of the flight as it is
 _POOR_ACCEPTANCE = 0.05
+_POOR_RENEWAL = 0.01  # below it the intervals of planes with noise missed the probability in half of the trials
 _DISAGREE = 30.0  # largest over smallest estimate of the runs; chance alone brings some 5
 
 
@@ -59,7 +61,8 @@ class Climb(NamedTuple):
     """The last level reached.
 
     reached : float64[RUNS], each run's probability of the last level, which `members` represent.  weight : float64, of
-        every case flown.  flat : whether equal margins ended the levels.
+        every case flown.  flat : whether equal margins ended the levels.  renewed : the least accepted fraction, of all
+        levels, of the steps that drew the noise of the flight anew.
     """
 
     members: Members
@@ -67,6 +70,7 @@ class Climb(NamedTuple):
     levels: tuple[Level, ...]
     weight: np.ndarray
     flat: bool
+    renewed: float
 
 
 def subset_simulation(
@@ -95,12 +99,16 @@ def subset_simulation(
         return plain_count(flights, climb.levels, confidence)
     estimates = climb.reached * _shares(climb.members.run[climb.members.margin <= 0.0], per_run)
     lower, upper = interval_of_mean(estimates, confidence)
+    cases = flights.evaluated(climb.weight)
     if not estimates.any():  # failure is rarer than the last level
         upper = interval_of_mean(climb.reached, confidence)[1]
+    if climb.renewed < _POOR_RENEWAL:
+        plain = cases.failed[cases.level == 0]
+        low, high = clopper_pearson(int(plain.sum()), plain.size, confidence)
+        lower, upper = min(lower, low), max(upper, high)
     mean = float(estimates.mean())
     error = float(estimates.std(ddof=1)) / (mean * math.sqrt(RUNS)) if mean > 0.0 else math.inf
     remarks = tuple(_remarks(climb, estimates))
-    cases = flights.evaluated(climb.weight)
     return RareEvent("subset", mean, lower, upper, confidence, error, climb.levels, cases, remarks)
 
 
@@ -109,7 +117,7 @@ def _run_levels(flights: Flights, rng: np.random.Generator, n_inputs: int, per_r
     n = per_run * RUNS
     fresh, run = np.full(n, FRESH), np.repeat(np.arange(RUNS), per_run)
     members = _flown(flights, rng.standard_normal((n, n_inputs)), fresh, run, 0)
-    reached, scale = np.ones(RUNS), _FIRST_SCALE
+    reached, scale, renewed = np.ones(RUNS), _FIRST_SCALE, 1.0
     levels, weights = [Level(math.inf, 1.0, RUNS, n, 1.0)], list[tuple[np.ndarray, np.ndarray]]()
     while True:
         threshold = _threshold(members.margin)
@@ -118,12 +126,14 @@ def _run_levels(flights: Flights, rng: np.random.Generator, n_inputs: int, per_r
             total = np.zeros(flights.n)
             for cases, share in [*weights, (members.case, weight)]:
                 np.add.at(total, cases, share)
-            return Climb(members, reached, tuple(levels), total, threshold is None)
+            return Climb(members, reached, tuple(levels), total, threshold is None, renewed)
         near = members.margin <= threshold
         weights.append((members.case[~near], weight[~near]))
         reached = reached * _shares(members.run[near], per_run)
         before = flights.n
-        members, accepted, scale = _chains(flights, rng, members.take(near), per_run, threshold, scale, len(levels))
+        seeds, level = members.take(near), len(levels)
+        members, accepted, anew, scale = _chains(flights, rng, seeds, per_run, threshold, scale, level)
+        renewed = min(renewed, anew)
         alive = int(np.count_nonzero(reached))
         levels.append(Level(threshold, float(reached.mean()), alive, flights.n - before, accepted))
 
@@ -153,8 +163,8 @@ def _threshold(margin: np.ndarray) -> float | None:
 
 def _chains(
     flights: Flights, rng: np.random.Generator, seeds: Members, per_run: int, threshold: float, scale: float, level: int
-) -> tuple[Members, float, float]:
-    """(members at or below the threshold, share of steps accepted, scale of the steps); `per_run` for each run.
+) -> tuple[Members, float, float, float]:
+    """(members at or below the threshold, share of steps accepted, of those with new noise, scale); `per_run` a run.
 
     The seeds are among the members.  Candidate: rho u + sigma times a normal vector, rho^2 + sigma^2 = 1, which keeps
     the normal density, so it is accepted if it is at or below the threshold.  Papaioannou et al. (2015), eq. (15) and
@@ -163,7 +173,7 @@ def _chains(
     """
     state, length = _shared_out(seeds.take(rng.permutation(seeds.case.size)), per_run)
     spread = np.minimum(seeds.u.std(axis=0), 1.0)
-    kept, shares = [state], list[float]()
+    kept, shares, anew = [state], list[float](), list[np.ndarray]()
     for step in range(1, int(length.max())):
         state, length = state.take(length > step), length[length > step]
         sigma = np.minimum(scale * spread, 1.0)
@@ -177,9 +187,10 @@ def _chains(
         )
         kept.append(state)
         shares.append(float(accepted.mean()))
+        anew.append(accepted[noise == FRESH])
         scale = min(max(scale * math.exp((shares[-1] - _WANTED_ACCEPTANCE) / math.sqrt(len(shares))), 1e-3), 10.0)
     members = Members(*(np.concatenate(values) for values in zip(*kept, strict=True)))
-    return members, float(np.mean(shares)), scale
+    return members, float(np.mean(shares)), float(np.concatenate(anew).mean()), scale
 
 
 def _shared_out(seeds: Members, per_run: int) -> tuple[Members, np.ndarray]:
@@ -217,5 +228,10 @@ def _remarks(climb: Climb, estimates: np.ndarray) -> list[str]:
             f"In level {poor[0]} only {levels[poor[0]].accepted:.1%} of the steps were accepted: the chains hardly "
             "move, because failure hangs on the noise of the flight or on very few inputs together. The interval may "
             "be too narrow."
+        )
+    if climb.renewed < _POOR_RENEWAL:
+        remarks.append(
+            "In a level fewer than 1 % of the steps with new noise of the flight were accepted: the noise decides the "
+            "failures, and the estimate may be far off. The interval includes that of the plain cases of level 0."
         )
     return remarks

@@ -97,6 +97,13 @@ def test_noise_of_the_flight_belongs_to_the_probability(method, share):
     assert sum(event.lower <= p <= event.upper for event in events) >= 18
 
 
+def test_the_interval_reaches_to_that_of_plain_cases_where_noise_decides_the_failures():
+    """Chains with new noise hardly ever come to rare failures, and 15 levels that keep theirs lead elsewhere."""
+    event = subset_simulation(noisy(0.9, distance=4.75), 1, cases_per_level=1_000, seed=2, noise=True)
+    assert event.lower < stats.norm.sf(4.75) < event.upper == pytest.approx(1.0 - 0.025**1e-3)
+    assert "fewer than 1 % of the steps with new noise of the flight were accepted" in event.remarks[-1]
+
+
 def test_importance_sampling_names_subset_simulation_where_noise_decides_the_failures():
     event = cross_entropy(noisy(0.7, distance=2.5), 1, cases_per_level=1_000, seed=2, noise=True)
     halted, few = event.remarks
@@ -132,7 +139,7 @@ def test_each_level_has_the_probability_of_its_margin(method):
 
 def test_runs_that_disagree_or_found_nothing_are_said():
     def remarks_of(estimates, accepted=0.5):
-        return _remarks(Climb(None, None, (Level(0.0, 1.0, 10, 100, accepted),), None, False), np.array(estimates))
+        return _remarks(Climb(None, None, (Level(0.0, 1.0, 10, 100, accepted),), None, False, 1.0), np.array(estimates))
 
     for least, found in ((3.4e-8, ""), (3.3e-8, "The runs disagree"), (0.0, "1 of 10 runs found no")):
         remarks = " ".join(remarks_of([least, *9 * [1e-6]]))
