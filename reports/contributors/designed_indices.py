@@ -128,5 +128,5 @@ def _morris_note(confidence: str) -> str:
         "as one input steps between the middles of quarters of its distribution that lie two apart, divided by 2/3. "
         "μ*: mean size; μ: mean; σ: standard deviation, large where the effect bends or depends on other inputs. It "
         "ranks inputs; Sobol’ indices need the design saltelli. A trajectory with a case that has no number is left "
-        "out whole."
+        "out whole. Random draws in flight enlarge every μ* and σ."
     )

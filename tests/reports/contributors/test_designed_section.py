@@ -36,6 +36,7 @@ def test_indices_stand_in_a_table_that_counts_whole_blocks(design, size, word):
     assert propellant[0][2].value > propellant[1][2].value > 0.0
     assert propellant[0][2].small.startswith("± ")
     assert sum(isinstance(block, FigureBlock) for block in blocks) == (design == "saltelli")
+    assert "Random draws in flight " in table.note
     assert ("below 0 or above 1 it is an error of the estimate" in table.note) == (design == "saltelli")
 
 
