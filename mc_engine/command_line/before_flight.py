@@ -69,6 +69,8 @@ def check(
     A few cases are flown in a separate process.  All results must exist and not depend on the other cases in the batch,
     every dispersion must have an effect, no metric may be a fixed number, and every event must happen.
     """
+    from mc_engine.store.manifest_file import seed_remark
+
     with _flights_beside(file) if model else nullcontext() as process:
         campaign, flyer, problems = _checked(file, process)
     if problems:
@@ -79,6 +81,9 @@ def check(
         f"{counted(len(campaign.dispersions), 'dispersion')}, {counted(len(campaign.correlations), 'correlation')}, "
         f"{counted(len(campaign.requirements), 'requirement')}; valid"
     )
+    upstream = campaign.upstream
+    if upstream is not None and (alike := seed_remark(campaign.seed, upstream.rows.facts)):
+        typer.echo(f"seed {alike}")
     for line in flyer.remarks() if model else []:
         typer.echo(line)
 

@@ -10,6 +10,7 @@ from mc_engine.numbers_in_text import decimals_of, outward, percent_digits
 from mc_engine.section import ReportSection
 from mc_engine.shell_words import shell_word
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
+from mc_engine.store.manifest_file import seed_remark
 from mc_engine.store.parts import CASE_COLUMNS, Column, Part, numbers_in, read_part, rows_with
 from mc_engine.store.run_files import NO_NOMINAL
 from mc_engine.store.store import Store
@@ -141,6 +142,12 @@ def analyses_line(store: Store) -> str:
     else:
         history = f"extended from {begun:,} to {store.n_cases:,} cases"
     return f"{history}; the verdicts hold at every number of cases at once"
+
+
+def seed_line(store: Store) -> str:
+    """That the campaign has the seed of the one upstream; else empty."""
+    upstream = store.manifest.get("upstream")
+    return seed_remark(store.manifest["campaign"].get("seed"), upstream) if upstream else ""
 
 
 def integration_line(store: Store) -> str:

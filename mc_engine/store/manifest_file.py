@@ -284,6 +284,19 @@ def columns_in(manifest: Mapping[str, Any]) -> tuple[Column, ...]:
     )
 
 
+def seed_remark(seed: int | None, upstream: Mapping[str, Any]) -> str:
+    """That a campaign has the seed of the one upstream, with which both draw alike; else empty.
+
+    upstream : facts of the run upstream, with `name` and `seed`.
+    """
+    if seed is None or seed != upstream["seed"]:
+        return ""
+    return (
+        f"{seed} is also that of {upstream['name']}: noise in flight and dispersions of the same name are the same "
+        "draws in both campaigns; choose another seed"
+    )
+
+
 def edited_files(run: Path, digests: Mapping[str, str]) -> Iterator[str]:
     """A sentence for each of these files that is missing or changed.  digests : SHA-256 by name."""
     for name, digest in digests.items():

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from mc_engine.statistics import Summary
+from mc_engine.store.manifest_file import seed_remark
 from mc_engine.units import UNITS, convert
 from reports.document.blocks import Cell, Column, Table
 from reports.run.chosen_units import spread_text
@@ -50,6 +51,8 @@ def _vehicle(flown: Flown) -> str:
     )
     if upstream:
         said.append(f"Each case continues a case of the run of {upstream['name']}.")
+        alike = seed_remark(flown.manifest["campaign"].get("seed"), upstream)
+        said.append(f"The seed {alike}." if alike else "")
     return " ".join(filter(None, said))
 
 

@@ -126,6 +126,19 @@ def test_the_rows_keep_the_columns_upstream_under_names_that_are_free(cases):
     assert second["first_status"].tolist() == first["status"].tolist()
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_campaigns_with_one_seed_are_said_to_draw_alike(folder, tmp_path, seed):
+    text = (folder / "second" / "campaign.toml").read_text().replace("../runs", str(folder / "runs"))
+    shutil.copytree(folder / "second", tmp_path / "second")
+    (tmp_path / "second" / "campaign.toml").write_text(text.replace("seed = 2", f"seed = {seed}"))
+    checked = call("check", tmp_path / "second")
+    flown = call("run", tmp_path / "second", "--out", tmp_path / "run")
+    assert (checked.exit_code, flown.exit_code) == (0, 0)
+    page = (tmp_path / "run" / "report.html").read_text()
+    for said, words in ((checked.stdout, "seed 1 is"), (flown.stdout, "seed         1 is"), (page, "The seed 1 is")):
+        assert (f"{words} also that of first: noise in flight" in said) == (seed == 1)
+
+
 def test_roles_and_nominal_case_follow_the_chain(folder):
     store = open_store(folder / "runs" / "second")
     roles = {column.name: column.role for column in store.columns}
