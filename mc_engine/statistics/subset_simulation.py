@@ -231,7 +231,8 @@ def _remarks(climb: Climb, estimates: np.ndarray) -> list[str]:
         )
     if climb.renewed < _POOR_RENEWAL:
         remarks.append(
-            "In a level fewer than 1 % of the steps with new noise of the flight were accepted: the noise decides the "
-            "failures, and the estimate may be far off. The interval includes that of the plain cases of level 0."
+            "In a level fewer than 1 % of the steps with new noise of the flight were accepted, as where the noise "
+            "decides the failures: the estimate may be far off. The interval includes that of the plain cases of level "
+            "0."
         )
     return remarks
