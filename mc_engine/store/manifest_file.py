@@ -287,9 +287,9 @@ def columns_in(manifest: Mapping[str, Any]) -> tuple[Column, ...]:
 def seed_remark(seed: int | None, upstream: Mapping[str, Any]) -> str:
     """That a campaign has the seed of the one upstream, with which both draw alike; else empty.
 
-    upstream : facts of the run upstream, with `name` and `seed`.
+    upstream : facts of the run upstream, with `name` and perhaps `seed`.
     """
-    if seed is None or seed != upstream["seed"]:
+    if seed is None or seed != upstream.get("seed"):
         return ""
     return (
         f"{seed} is also that of {upstream['name']}: noise in flight and dispersions of the same name are the same "
