@@ -81,8 +81,7 @@ def check(
         f"{counted(len(campaign.dispersions), 'dispersion')}, {counted(len(campaign.correlations), 'correlation')}, "
         f"{counted(len(campaign.requirements), 'requirement')}; valid"
     )
-    upstream = campaign.upstream
-    if upstream is not None and (alike := seed_remark(campaign.seed, upstream.rows.facts)):
+    if alike := seed_remark(campaign.seed, campaign.upstream.rows.facts if campaign.upstream else None):
         typer.echo(f"seed {alike}")
     for line in flyer.remarks() if model else []:
         typer.echo(line)

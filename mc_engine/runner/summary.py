@@ -146,8 +146,7 @@ def analyses_line(store: Store) -> str:
 
 def seed_line(store: Store) -> str:
     """That the campaign has the seed of the one upstream; else empty."""
-    upstream = store.manifest.get("upstream")
-    return seed_remark(store.manifest["campaign"].get("seed"), upstream) if upstream else ""
+    return seed_remark(store.manifest["campaign"].get("seed"), store.manifest.get("upstream"))
 
 
 def integration_line(store: Store) -> str:

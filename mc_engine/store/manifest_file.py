@@ -284,12 +284,12 @@ def columns_in(manifest: Mapping[str, Any]) -> tuple[Column, ...]:
     )
 
 
-def seed_remark(seed: int | None, upstream: Mapping[str, Any]) -> str:
+def seed_remark(seed: int | None, upstream: Mapping[str, Any] | None) -> str:
     """That a campaign has the seed of the one upstream, with which both draw alike; else empty.
 
-    upstream : facts of the run upstream, with `name` and perhaps `seed`.
+    upstream : facts of the run upstream, with `name` and perhaps `seed`; None without one.
     """
-    if seed is None or seed != upstream.get("seed"):
+    if upstream is None or seed is None or seed != upstream.get("seed"):
         return ""
     return (
         f"{seed} is also that of {upstream['name']}: noise in flight and dispersions of the same name are the same "
