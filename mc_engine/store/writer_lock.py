@@ -275,8 +275,9 @@ def _read(path: Path) -> dict[str, Any] | None:
 
 
 def _overwrite(path: Path, locked: list[int], content: bytes) -> None:
-    # On Windows only the descriptor that has the lock can write.
-    descriptor = locked[0] if locked else open_regular(path, os.O_WRONLY)
+    # On Windows only the descriptor that has the lock can write.  Without locks, the writer that made the directory may
+    # have removed the file since it was looked for.
+    descriptor = locked[0] if locked else open_regular(path, os.O_WRONLY | os.O_CREAT)
     try:
         os.ftruncate(descriptor, 0)
         os.lseek(descriptor, 0, os.SEEK_SET)

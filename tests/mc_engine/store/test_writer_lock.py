@@ -98,6 +98,20 @@ def test_without_system_locks_of_two_that_find_a_dead_holder_one_takes_over(stor
     assert second.acquire() is None
 
 
+def test_without_system_locks_a_lock_file_that_its_maker_removes_at_that_moment_is_made_anew(store, monkeypatch):
+    def unsupported(*_):
+        (store.path / ".lock").unlink(missing_ok=True)
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    with monkeypatch.context() as patched:
+        patched.setattr("fcntl.flock", unsupported)
+        lock = store.lock()
+        lock.__enter__()
+    with pytest.raises(StoreError, match="is writing here"):
+        open_store(store.path).note("x")
+    lock.__exit__(None, None, None)
+
+
 def test_a_writer_without_system_locks_whose_lock_is_deleted_writes_nothing_more(store, no_locks):
     other = open_store(store.path)
     with store.lock():
