@@ -1,6 +1,6 @@
 """The headline box: which requirements are met, with what confidence, and the key results."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import tau
 
 import numpy as np
@@ -192,7 +192,7 @@ def warnings(flown: Flown) -> tuple[str, ...]:
             f"With {flown.integration.by}, {flown.listed(coarse)} would change by more than {number(MUCH)} standard "
             "deviations: the error of integration is not small beside the spread (see Convergence)."
         )
-    sentences += [sentence for name in flown.summaries if (sentence := _jump(flown, name))]
+    sentences += turns(flown, flown.summaries)
     if not flown.random:
         sentences.append(
             f"The design is “{flown.design}”: its cases are chosen, not drawn at random. "
@@ -202,7 +202,12 @@ def warnings(flown: Flown) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def _jump(flown: Flown, name: str) -> str:
+def turns(flown: Flown, metrics: Iterable[str]) -> Iterator[str]:
+    """A sentence for each metric that may jump by a full turn between cases."""
+    return (sentence for name in metrics if (sentence := _turn(flown, name)))
+
+
+def _turn(flown: Flown, name: str) -> str:
     """That an angle has cases near both ends of a full turn and more than half a turn without any; else empty."""
     unit = UNITS.get(flown.unit(name))
     if unit is None or unit.quantity != "angle":

@@ -30,6 +30,7 @@ from reports.formats.html import render_html
 from reports.formats.pdf import render_pdf
 from reports.run.chosen_units import ShownRun, chosen_unit
 from reports.run.flown import Flown
+from reports.sections.headline import turns
 from reports.studies.comparison_figure import change_figure
 from reports.studies.comparison_overlays import overlay_blocks
 from reports.text.numbers import (
@@ -101,9 +102,11 @@ def write_comparison(comparison: Comparison, path: Path, runs: tuple[Store, Stor
 def build_comparison(comparison: Comparison, runs: tuple[Store, Store] | None = None) -> Document:
     """The comparison as a document: requirements first, then metrics, then what was edited in code and campaign."""
     overlays: tuple[Block, ...] = ()
+    angles: list[str] = []
     units = {change.metric: chosen_unit(comparison.units[change.metric], change.mean) for change in comparison.metrics}
     if runs is not None:
         own = Flown(runs[0], comparison.names[0]), Flown(runs[1], comparison.names[1])
+        angles = [f"Run {letter}, {jump}" for letter, run in zip("AB", own, strict=True) for jump in turns(run, units)]
         first = ShownRun(own[0])
         units = {metric: first.unit(metric) for metric in units}
         pair = first, ShownRun(own[1], like=first)
@@ -125,7 +128,7 @@ def build_comparison(comparison: Comparison, runs: tuple[Store, Store] | None = 
         facts=_run_facts(comparison),
         verdicts=tuple(_change_cards(comparison)),
         costs=(),
-        warnings=_comparison_warnings(comparison),
+        warnings=(*_comparison_warnings(comparison), *angles),
         sections=numbered(section for section in sections if section.blocks),
     )
 

@@ -170,6 +170,14 @@ def test_rounding_errors_of_nominal_cases_are_not_drawn_over_one_another():
     assert section.blocks[2].paragraphs == ("Not drawn, rounding errors only in both nominal cases: force_n.",)
 
 
+def test_an_angle_that_jumps_by_a_turn_in_one_of_the_runs_is_a_warning():
+    """A course of 0 deg ± 5 deg, whose mean is no course of any case, was compared without a word."""
+    runs = two_runs(0.0)
+    runs[1].table["entry_flight_path_angle_deg"] = np.linspace(355.0, 365.0, 1200) % 360.0
+    (told,) = build_comparison(compare_runs(*runs, ("before", "after")), tuple(runs)).warnings
+    assert told.startswith("Run B, entry flight path angle: the cases lie near both ends of a full turn")
+
+
 def test_the_same_run_twice_has_no_figure_and_says_so():
     document = build_comparison(compared())
     assert document.subtitle.startswith("No significant change")
