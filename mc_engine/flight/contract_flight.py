@@ -41,13 +41,15 @@ from mc_engine.model.faults import MORE, fault_of
 from mc_engine.model.fields import AdaptiveStep, FixedStep
 from mc_engine.model.record import Model, compiled_model
 from mc_engine.model.trial import fixed_metrics
-from mc_engine.sampling.distributions import column, quantiles
+from mc_engine.sampling.distributions import Discrete, column, quantiles
 from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
 
 _CASES = 32
 _BLOCKS = 4  # of lanes that they fill at most
 # where along its distribution an input is tried: not at its edges alone, where what works evenly does the same
 _PLACES = np.array([0.05, 0.8, 0.95])
+_TAILS = np.array([0.001, 0.999])  # where a failure may be that begins beyond a threshold of another input
+_ROWS = 10_000  # of a table, in which rare values are looked for
 _PARTNERS = 4  # cases in which an input is tried that does nothing in the nominal case
 LONGEST_S = 10.0  # of the flight of one case: with it, all that is flown here takes some minutes
 _NOMINAL = np.array([NOMINAL_NOISE])
@@ -320,10 +322,17 @@ def _met_while_above(campaign: Campaign, flown: Columns) -> Iterator[str]:
 
 
 def _moving_nothing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> Iterator[str]:
-    """Dispersions whose values all give the same metrics: of the nominal case and of some dispersed ones."""
+    """Dispersions whose values all give the same metrics: of the nominal case, of some dispersed ones, and of the
+    nominal case with another input at a rare value, such as that of a failure whose time is dispersed."""
     idle = [dispersion for dispersion in campaign.dispersions if not _moves(campaign, dispersion, campaign.nominal)]
     for dispersion in idle:
         rows = [{k: v[i] if np.ndim(v) else v for k, v in inputs.items()} for i in range(min(_PARTNERS, ids.size))]
+        rows += [
+            {**campaign.nominal, other.name: value}
+            for other in campaign.dispersions
+            if other is not dispersion
+            for value in _rare_values(campaign, other)
+        ]
         if not any(_moves(campaign, dispersion, row) for row in rows):
             name = dispersion.name
             yield f'dispersion "{name}" moves no metric; use it in the physics, or leave it out of the campaign'
@@ -340,14 +349,23 @@ def _moves(campaign: Campaign, dispersion: Dispersion, others: Mapping[str, Any]
     return any(first_difference(rows[0], row) is not None for row in rows[1:])
 
 
-def _trial_values(campaign: Campaign, dispersion: Dispersion) -> np.ndarray:
+def _trial_values(
+    campaign: Campaign, dispersion: Dispersion, probabilities: np.ndarray = _PLACES, n_rows: int = _CASES
+) -> np.ndarray:
     if campaign.upstream is None and campaign.design != "table":
         if dispersion.levels:
             return column(dispersion.levels)
         assert dispersion.distribution is not None  # a loaded campaign has one for every random design
-        return quantiles(dispersion.distribution, _PLACES)
-    values = case_table(campaign, np.arange(min(campaign.cases, _CASES)))[dispersion.name]
+        return quantiles(dispersion.distribution, probabilities)
+    values = case_table(campaign, np.arange(min(campaign.cases, n_rows)))[dispersion.name]
     return np.sort(values)[[0, 3 * values.size // 4, -1]]
+
+
+def _rare_values(campaign: Campaign, dispersion: Dispersion) -> np.ndarray:
+    """Every value of a discrete dispersion, and of another one those near its ends."""
+    if isinstance(dispersion.distribution, Discrete):
+        return column(dispersion.distribution.values)
+    return _trial_values(campaign, dispersion, _TAILS, _ROWS)
 
 
 def main() -> None:
