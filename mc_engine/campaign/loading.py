@@ -207,7 +207,7 @@ def _assemble(
         if design == "table":
             dispersions = table_dispersions(table, dispersions, findings)
     count = None
-    if section is not None and (sections.inputs is None or upstream is not None):
+    if section is not None and ("inputs" not in document or upstream is not None):
         rows = 0 if upstream is None else (first.cases if first is not None else upstream.rows.n_cases)
         count = chained_count(section, rows, inside) if rows else _case_count(section, dispersions, table, inside)
     if count is not None:

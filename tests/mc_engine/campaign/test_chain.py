@@ -227,11 +227,13 @@ def test_what_does_not_fit_is_said_with_its_place(folder):
         (('design = "mc"', 'design = "table"'), 'write design = "mc" to disperse more'),
         (("[inputs]", "[parameters]\nheight_km = 1\n[inputs]"), "comes from the run of first; leave it out here"),
         (("seed = 2", "seed = 2\ncases = 41"), "41 is not allowed; the run upstream has 40 cases"),
+        (("from =", "height_km = 1\nfrom ="), 'inputs.height_km: is not a known key; known are "from"'),
     ]:
         assert change[0] in text
         with pytest.raises(CampaignError) as caught:
             load_campaign("second", text=text.replace(*change), directory=folder / "second")
         assert message in str(caught.value)
+        assert "campaign.cases: is missing" not in str(caught.value)  # the run upstream has them
 
 
 @pytest.mark.parametrize(
