@@ -142,6 +142,8 @@ def _distribution_text(campaign: Campaign, dispersion: Dispersion, unit: str) ->
             text = f"{given:.{_SIGMA_DIGITS}g}" if key in _SIGMAS else _scalar_text(given)
             value = _with_unit(text, "" if plain else unit)
             parts.append(f"±{value}" if key == "half_range" else f"{signs.get(key, key)} = {value}")
+    if dispersion.dist == "exponential" and "origin" not in dispersion.spec:
+        parts.insert(1, f"origin = {_with_unit(_scalar_text(campaign.nominal[dispersion.name]), unit)}")
     return ", ".join(parts)
 
 

@@ -103,7 +103,7 @@ def test_records_say_each_dispersion_as_its_review_table_would():
     assert texts["speed_pct"] == ("normal, 3σ = 20 %", "")
     assert texts["height_km"] == ("uniform, ±0.5 km", "")  # given in m
     assert texts["mass_kg"] == ("lognormal, σ of ln = 0.1", "")
-    assert texts["delay_s"] == ("exponential, scale = 3 s", "up to 10 s")
+    assert texts["delay_s"] == ("exponential, origin = 0 s, scale = 3 s", "up to 10 s")  # from the nominal value
     assert texts["control"] == ("discrete, values = off, clipped, weights = 1, 3", "")
 
 
