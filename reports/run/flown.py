@@ -149,11 +149,16 @@ class Flown:
         return ", ".join(self.words(name) for name in names)
 
     def axis(self, name: str) -> str:
-        """An axis label: the column's name in words with its unit; of an input that is a symbol, its meaning too."""
+        """An axis label: the column's name in words with its unit; of an input that is a symbol, its meaning too.
+
+        Without the meaning if a state or output has the same name: the initial position is not the position in flight.
+        """
         # Of the inputs' own records: the columns of a run upstream have its name before their meaning.
         meanings = {
             str(record["name"]): str(record.get("description", "")) for record in self.manifest.get("inputs", [])
         }
+        for record in self.manifest.get("quantities", []):
+            meanings.pop(str(record["name"]), None)
         return axis_label(named(self.words(name), meanings.get(name, "")), self.unit(name))
 
     @property

@@ -6,7 +6,7 @@ from mc_engine.statistics import Summary
 from mc_engine.store.manifest_file import seed_remark
 from mc_engine.units import UNITS, convert
 from reports.document.blocks import Cell, Column, Table
-from reports.run.chosen_units import spread_text
+from reports.run.chosen_units import chosen_unit, spread_text
 from reports.run.flown import Flown
 from reports.run.phases import phase_times
 from reports.sections.tables import fixed_table, input_table
@@ -128,7 +128,9 @@ def _range_text(flown: Flown, name: str, summary: Summary) -> str:
 
 def _phase_row(flown: Flown, place: int, name: str, time: float) -> tuple[Cell, ...]:
     """Where a phase of the nominal case begins, as far as the rows of its history tell."""
-    told = Cell(with_unit(number(time, 5), flown.unit("t_s")), convert(time, flown.unit("t_s"), "s"))
+    seconds = convert(time, flown.unit("t_s"), "s")
+    unit = chosen_unit("s", [seconds])  # not that of the histories, which suits the end of a long flight
+    told = Cell(with_unit(number(convert(seconds, "s", unit), 5), unit), seconds)
     when = "first saved row in this phase" if place else "first phase"
     return Cell(f"Phase {name} begins", small=when), told, Cell("–"), Cell("–")
 

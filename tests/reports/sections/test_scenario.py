@@ -10,6 +10,7 @@ from mc_engine.runner.manifest import manifest_of
 from reports.contents import build
 from reports.document.blocks import FigureBlock, Table
 from reports.drawing.marks import Limit, Points
+from reports.run.flown import Flown
 
 
 def section(run, anchor):
@@ -73,6 +74,28 @@ def test_phases_of_the_nominal_case_are_in_the_timeline_and_marked_in_the_histor
     assert {mark.name: mark.at for mark in lines} == {f"{name} begins": at for name, at in begins.items()}
     assert {mark.key.split(",")[0] for mark in lines} == {"phases of the nominal case: rail"}
     assert "phase" not in {plot.quantity for one in histories for plot in one.drawing.plots}
+
+
+def test_phases_in_the_first_minutes_of_days_are_told_in_seconds_as_the_metrics_are():
+    run = synthetic_run(50, failed=0)
+    t = 1000.0 * run.history["t_s"]
+    run.history = run.history.assign(t_s=t, phase=np.where(t < t.max() / 100.0, "wait", "transfer"))
+    table = next(one for one in section(run, "scenario").blocks if isinstance(one, Table))
+    told = {row[0].text: row[1] for row in table.rows}["Phase transfer begins"]
+    assert told.text.endswith("\u202fs")
+    assert float(told.text.removesuffix("\u202fs").replace("\u202f", "")) == pytest.approx(told.value, rel=1e-4)
+
+
+def test_an_output_is_not_labelled_with_the_meaning_of_the_input_of_the_same_name():
+    run = synthetic_run(50, failed=0)
+    run.manifest["quantities"].append({"name": "x_m", "unit": "m", "description": "radial position"})
+    run.manifest["inputs"] = [
+        {"name": "x_m", "unit": "m", "description": "initial radial position"},
+        {"name": "ve_pct", "unit": "%", "description": "error of the burn's size, VE"},
+    ]
+    flown = Flown(run, "run")
+    assert flown.axis("x_m") == "x [m]"
+    assert flown.axis("ve_pct") == "ve: error of the burn's size [%]"
 
 
 def test_assumptions_are_what_the_campaign_file_sets_and_the_rest_is_in_the_appendix():
