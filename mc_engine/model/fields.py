@@ -181,6 +181,8 @@ class Event:
 
     function : physics that takes any of t, s, m, p, o by name; returns the number whose zero crossing is the event.
         Crossings that follow each other within one step are missed; of an adaptive step two are found.
+        A function that is past zero at the start, or jumps over zero at a sample or by `switch`, does not cross it:
+        for a hysteresis, `start` must give the discrete state that belongs to the initial value.
     direction : str, "rising", "falling" or "either"
     action : str, "stop" ends the case, "switch" calls the model's `switch`; by default "stop", and "switch" with `to`
     to : str, the phase that begins, see `Phase`; `switch` may change state and discrete state there, too
