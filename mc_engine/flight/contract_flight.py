@@ -42,7 +42,7 @@ from mc_engine.model.fields import AdaptiveStep, FixedStep
 from mc_engine.model.record import Model, compiled_model
 from mc_engine.model.trial import fixed_metrics
 from mc_engine.sampling.distributions import Discrete, column, quantiles
-from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
+from mc_engine.status import NOT_FINITE, OK, STATUS_NAME, STATUS_TEXT
 
 _CASES = 32
 _BLOCKS = 4  # of lanes that they fill at most
@@ -54,6 +54,7 @@ _PARTNERS = 4  # cases in which an input is tried that does nothing in the nomin
 LONGEST_S = 10.0  # of the flight of one case: with it, all that is flown here takes some minutes
 _NOMINAL = np.array([NOMINAL_NOISE])
 _GROSS = 0.1  # of the size of the states; halving changed sound steps by 0.03 at most, unstable ones by 1 to 100
+_SAME_STEPS = 10  # grid points within which a number is lost that the equations lose
 _VISIBLE = 1e-4  # of the size of the states: finer steps change those of the shipped campaigns by 2e-5 at most
 _ROUNDED = 1e-6  # of a step: a billion steps as numbers of 16 digits miss `until` by less
 
@@ -129,9 +130,10 @@ def _length(campaign: Campaign) -> str:
 
 
 def _too_long(campaign: Campaign, nominal: Columns) -> list[str]:
-    """One sentence if the end state of the nominal case is grossly different with half the step of a multistep method.
+    """One sentence if the nominal case ends grossly differently with half the step of a multistep method.
 
-    Beyond the stability limit of the method errors grow at every step, but absurd numbers have status ok while finite.
+    Beyond the stability limit of the method errors grow at every step.  Absurd numbers have status ok while finite.  If
+    they overflow with either step, they do so at another time; what `rhs` itself makes infinite is so at the same one.
     """
     model, (_, settings) = compiled_model(campaign.model), nominal_inputs(campaign)
     clock = model.clock
@@ -142,8 +144,13 @@ def _too_long(campaign: Campaign, nominal: Columns) -> list[str]:
         halved = results(campaign, campaign.nominal, _NOMINAL, finer(clock, nominal[END_TIME][0]))
     name, coarse, fine = "status", nominal["status"][0], halved["status"][0]
     if coarse == fine:
-        begun = results(campaign, campaign.nominal, _NOMINAL, replace(clock, until=clock.step))
-        name = _far(model, begun, nominal, halved) if coarse == STATUS_NAME[OK] else ""
+        name = ""
+        if coarse == STATUS_NAME[OK]:
+            begun = results(campaign, campaign.nominal, _NOMINAL, replace(clock, until=clock.step))
+            name = _far(model, begun, nominal, halved)
+        elif coarse == STATUS_NAME[NOT_FINITE]:
+            ends = nominal[END_TIME][0], halved[END_TIME][0]
+            name = END_TIME if abs(ends[0] - ends[1]) > _SAME_STEPS * step else ""
         if not name:
             return []
         coarse, fine = (f"{row[name][0]:.3g}" for row in (nominal, halved))

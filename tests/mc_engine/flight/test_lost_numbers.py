@@ -232,3 +232,11 @@ def test_an_interpreted_flight_has_the_bits_of_the_kernel(name, tmp_path):
     if flown["status"][0] == "ok":
         for field, row in zip(campaign.model.metrics, metrics, strict=True):
             np.testing.assert_equal(flown[field.name][0], row[0] / field.si_factor, err_msg=field.name)
+
+
+def test_numbers_that_too_long_a_step_makes_infinite_are_not_blamed_on_a_line(tmp_path):
+    damped = ("vx=g * s.x, vy=g * s.y)", "vx=g * s.x - s.vx, vy=g * s.y - s.vy)")  # time constant 1 s
+    clock = 'FixedStep(1.0, 400.0, method="gj9", rates=(("x", "vx"), ("y", "vy")))'
+    edits = ("FixedStep(step=10.0, until=10_000.0)", clock), ('events={"apogee": Event(climb, "falling", "stop")}', "")
+    sentence = only(faults(campaign_with(tmp_path, damped, *edits)))  # half of the step overflows, too
+    assert 'steps of 1 s are too long for "gj9": the nominal case has the end_time_s' in sentence
