@@ -8,8 +8,9 @@ Each step predicts and evaluates once (PE).  A corrector would cost a second eva
 their prediction alone is stable for short steps only, see `multistep`.  With second sums the prediction alone is
 stable: an oscillation of w rad/s does not grow while step times w is below 0.33, 0.24, 0.17, 0.12, 0.09 for gj6 to
 gj10.  The acceleration may depend on the rates, which are predicted to the same order, but only weakly, as with drag in
-orbit: step times damping rate must be below 0.023, 0.012, 0.006, 0.003, 0.0016.  The order of the method is the order
-of the differences plus two; gj10 reaches rounding errors before its order can be seen (all measured in
+orbit: step times damping rate must be below 0.023, 0.012, 0.006, 0.003, 0.0016, and so must step times twice the
+angular velocity of a turning frame, whose Coriolis acceleration depends on the rates.  The order of the method is the
+order of the differences plus two; gj10 reaches rounding errors before its order can be seen (all measured in
 tests/mc_engine/lanes/test_gauss_jackson.py).
 
 A flight begins with single steps of DOP853 on the same grid.  So does a lane after an event, or after a control sample

@@ -222,8 +222,9 @@ class FixedStep:
         or "gj6" to "gj10", Gauss-Jackson with differences of order 6 to 10, for models in which each state either is
         the rate of another state or has a rate among the states.  A step is stable if step times the fastest angular
         frequency [rad/s] is below 0.37, 0.26, 0.18, 0.12, 0.075 for the five orders of ABM; below 0.33, 0.24, 0.17,
-        0.12, 0.09 for GJ, and only with weak damping, see `mc_engine.lanes.gauss_jackson`.  Both methods start by
-        DOP853, and restart so after each event and each control sample that changes the discrete state.
+        0.12, 0.09 for GJ, and only with weak damping and in frames that turn slowly, see
+        `mc_engine.lanes.gauss_jackson`.  Both methods start by DOP853, and restart so after each event and each control
+        sample that changes the discrete state.
         `mc-engine check` also flies the nominal case with half the step, and reports a step that is far too long.
     rates : tuple of pairs (state, its rate) by their names without units, for GJ: the derivative of the first state of
         a pair is the second

@@ -17,6 +17,7 @@ from mc_engine.lanes.gauss_jackson import gauss_jackson_tables, sum_weights
 from mc_engine.model import load_model
 
 KEPLER = load_model("kepler.py", FOLDER)
+TURNING_FRAME = load_model("turning_frame.py", FOLDER)
 ORDERS = (6, 7, 8, 9, 10)
 
 
@@ -93,6 +94,15 @@ def test_a_speed_that_friction_takes_dies_out_below_the_limit_of_damping_and_gro
     speeds = abs(columns["end_v_m_s"])
     assert speeds[0] < 1e-10
     assert not speeds[1] < 1.0
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_turning_frame_has_the_limit_of_damping(order):
+    turns = np.array([DAMPED[order][0], 1.3 * DAMPED[order][1]]) / 2.0  # the acceleration is twice that times the speed
+    columns = flown(by(TURNING_FRAME, f"gj{order}"), turn_rad_s=turns, step_s=1.0, until_s=20_000.0)
+    kept, grown = columns["end_speed_m_s"]
+    assert kept == pytest.approx(1.0, abs=1e-9)
+    assert not grown < 2.0
 
 
 class GaussJacksonSteps:
