@@ -49,7 +49,7 @@ _BLOCKS = 4  # of lanes that they fill at most
 # where along its distribution an input is tried: not at its edges alone, where what works evenly does the same
 _PLACES = np.array([0.05, 0.8, 0.95])
 _TAILS = np.array([0.001, 0.999])  # where a failure may be that begins beyond a threshold of another input
-_ROWS = 10_000  # of a table, in which rare values are looked for
+_ROWS = 10_000  # of a table, among which its values are looked for
 _PARTNERS = 4  # cases in which an input is tried that does nothing in the nominal case
 LONGEST_S = 10.0  # of the flight of one case: with it, all that is flown here takes some minutes
 _NOMINAL = np.array([NOMINAL_NOISE])
@@ -356,15 +356,13 @@ def _moves(campaign: Campaign, dispersion: Dispersion, others: Mapping[str, Any]
     return any(first_difference(rows[0], row) is not None for row in rows[1:])
 
 
-def _trial_values(
-    campaign: Campaign, dispersion: Dispersion, probabilities: np.ndarray = _PLACES, n_rows: int = _CASES
-) -> np.ndarray:
+def _trial_values(campaign: Campaign, dispersion: Dispersion, probabilities: np.ndarray = _PLACES) -> np.ndarray:
     if campaign.upstream is None and campaign.design != "table":
         if dispersion.levels:
             return column(dispersion.levels)
         assert dispersion.distribution is not None  # a loaded campaign has one for every random design
         return quantiles(dispersion.distribution, probabilities)
-    values = case_table(campaign, np.arange(min(campaign.cases, n_rows)))[dispersion.name]
+    values = case_table(campaign, np.arange(min(campaign.cases, _ROWS)))[dispersion.name]
     return np.sort(values)[[0, 3 * values.size // 4, -1]]
 
 
@@ -372,7 +370,7 @@ def _rare_values(campaign: Campaign, dispersion: Dispersion) -> np.ndarray:
     """Every value of a discrete dispersion, and of another one those near its ends."""
     if isinstance(dispersion.distribution, Discrete):
         return column(dispersion.distribution.values)
-    return _trial_values(campaign, dispersion, _TAILS, _ROWS)
+    return _trial_values(campaign, dispersion, _TAILS)
 
 
 def main() -> None:
