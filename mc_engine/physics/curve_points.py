@@ -214,6 +214,11 @@ def nearest_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.column_stack([np.append(y, y[-1]), np.zeros(x.size + 1)])
 
 
+def previous_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(value, 0) from each point on."""
+    return np.column_stack([y, np.zeros(x.size)])
+
+
 # ---- a cell behind each point of a grid
 
 
@@ -230,6 +235,11 @@ def linear_cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
 def nearest_cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
     """The value from each pair of turnovers on."""
     return np.pad(z, ((0, 1), (0, 1)), "edge")
+
+
+def previous_cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """The value from each point of the grid on."""
+    return z
 
 
 def cubic_cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -34,13 +34,15 @@ from mc_engine.physics.curve_points import (
     nearest_cells,
     nearest_rows,
     path_beside_caller,
+    previous_cells,
+    previous_rows,
     refuse_points,
     turnovers,
 )
 from mc_engine.physics.vectors import Vector
 from mc_engine.suggestions import listed
 
-KINDS = ("linear", "cubic", "nearest")
+KINDS = ("linear", "cubic", "nearest", "previous")
 OUTSIDE = ("held", "zero", "ends")
 _HEADER = 8  # low, high, buckets per unit, last bucket, levels, place of the points, of the buckets, of what follows
 _MOST_BUCKETS = 16384  # 512 KB: beyond, a look-up waits for memory longer than for another comparison
@@ -87,7 +89,8 @@ def curve(
         y_unit, or else in SI.
     x : strictly increasing, at least two points.  All numbers are finite.
     kind : "linear"; "cubic", smooth (continuous slope) and monotone where the points are (PCHIP, F. N. Fritsch and
-        J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304); "nearest", of two equally near points the lower one.
+        J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304); "nearest", of two equally near points the lower one;
+        "previous", from each point on its value.
     outside : the value outside the points: "held", the first or the last value; "zero"; or "ends": NaN, so that the
         case ends as "not-finite".
 
@@ -159,7 +162,7 @@ def surface(
     units : units of columns whose names do not end in one, by column.
     Without a file, x and y are increasing numbers and z is float64[n_x, n_y], in SI or in the `units` of "x", "y", "z".
     kind : "linear" in each direction (bilinear); "cubic" in each (bicubic), smooth (continuous slopes), and along the
-        lines of the grid the cubic curve through their points; or "nearest".
+        lines of the grid the cubic curve through their points; "nearest"; or "previous".
     outside : as in `curve`.
     """
     _refuse_unknown(kind, KINDS, "kind")
@@ -280,14 +283,14 @@ def _cubic(numbers, x):
 
 
 @physics
-def _nearest(numbers, x):
+def _constant(numbers, x):
     point, way, outside = _segment(numbers, 0.0, x)
     y, _ = row_of_two(numbers, one_at(numbers, 7), point)
     return where(way == way, y, way), outside
 
 
-_ROWS = {"linear": linear_rows, "cubic": cubic_rows, "nearest": nearest_rows}
-_AT = {"linear": _linear, "cubic": _cubic, "nearest": _nearest}
+_ROWS = {"linear": linear_rows, "cubic": cubic_rows, "nearest": nearest_rows, "previous": previous_rows}
+_AT = {"linear": _linear, "cubic": _cubic, "nearest": _constant, "previous": _constant}
 
 
 @physics
@@ -307,7 +310,7 @@ def _bilinear(numbers, x, y):
 
 
 @physics
-def _nearest_on_grid(numbers, x, y):
+def _constant_on_grid(numbers, x, y):
     first, cell, way_x, way_y, outside = _cell(numbers, x, y)
     way = way_x + way_y
     return where(way == way, one_at(numbers, first + cell), way), outside
@@ -330,8 +333,8 @@ def _cubic_along_y(numbers, first, row, way):
     return c0 + way * (c1 + way * (c2 + way * c3))
 
 
-_CELLS = {"linear": linear_cells, "cubic": cubic_cells, "nearest": nearest_cells}
-_ON = {"linear": _bilinear, "cubic": _bicubic, "nearest": _nearest_on_grid}
+_CELLS = {"linear": linear_cells, "cubic": cubic_cells, "nearest": nearest_cells, "previous": previous_cells}
+_ON = {"linear": _bilinear, "cubic": _bicubic, "nearest": _constant_on_grid, "previous": _constant_on_grid}
 
 
 # ---- functions that physics calls

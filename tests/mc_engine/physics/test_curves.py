@@ -66,6 +66,17 @@ def test_a_surface_is_scipys_and_meets_its_points(sizes, kind):
     assert f(*np.meshgrid(x, y, indexing="ij")).tolist() == z.tolist()
 
 
+def test_a_surface_may_hold_the_value_of_each_point_up_to_the_next():
+    x, y = (np.sort(RNG.uniform(-1.0, 1.0, size)) for size in (12, 40))
+    z = RNG.normal(size=(12, 40))
+    f = surface(x=x, y=y, z=z, kind="previous")
+    at = RNG.uniform(x[0], x[-1], N), RNG.uniform(y[0], y[-1], N)
+    i, j = (np.searchsorted(points, places, "right") - 1 for points, places in zip((x, y), at, strict=True))
+    assert every_way(f, *at).tolist() == z[i, j].tolist()
+    assert f(*np.meshgrid(x, y, indexing="ij")).tolist() == z.tolist()
+    assert f(*np.meshgrid(np.nextafter(x[1:], -1.0), y, indexing="ij")).tolist() == z[:-1].tolist()
+
+
 def test_a_cubic_surface_is_scipys_cubic_along_x_through_its_cubics_along_y():
     x, y = (np.sort(RNG.uniform(-1.0, 1.0, size)) for size in (9, 14))
     z = RNG.normal(size=(9, 14))
@@ -157,7 +168,7 @@ def test_a_surface_has_the_same_edges(outside, kind):
     f = surface(x=[0.0, 1.0], y=[0.0, 2.0], z=[[1.0, 2.0], [3.0, 4.0]], outside=outside, kind=kind)
     x, y = np.array([0.5, -1.0, 0.5, np.nan, 0.5, np.nan, 9.0]), np.array([1.0, 1.0, 5.0, 1.0, np.nan, 5.0, np.nan])
     found = every_way(f, x, y)
-    middle, held = (1.0, [1.0, 2.0]) if kind == "nearest" else (2.5, [1.5, 3.0])
+    middle, held = (1.0, [1.0, 2.0]) if kind in ("nearest", "previous") else (2.5, [1.5, 3.0])
     beyond = {"held": held, "zero": [0.0, 0.0], "ends": [np.nan, np.nan]}[outside]
     np.testing.assert_array_equal(found, [middle, *beyond, np.nan, np.nan, np.nan, np.nan])
 
