@@ -41,8 +41,8 @@ class ReportSection(Section):
 
     @property
     def percentiles(self) -> tuple[float, ...]:
-        """The percentiles in a report, ascending."""
-        return self.outer[0], self.low, 0.5, self.probability, self.outer[1]
+        """The percentiles in a report, ascending, each once: with a probability of 50 % three of them are the median."""
+        return tuple(sorted({*self.outer, self.low, 0.5, self.probability}))
 
     @property
     def two_sided(self) -> float:

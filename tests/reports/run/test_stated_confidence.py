@@ -12,6 +12,7 @@ from mc_engine.runner.manifest import manifest_of
 from mc_engine.studies.comparison import compare_runs
 from reports.contents import build
 from reports.document.blocks import Table, blocks_of
+from reports.formats.html import render_html
 from reports.formats.json_data import render_json
 from reports.formats.markdown import render_markdown
 from reports.run.flown import Flown
@@ -73,6 +74,17 @@ def test_another_pair_is_that_of_headline_tables_bounds_and_data():
     record = json.loads(render_json(document))
     assert (record["probability"], record["confidence"]) == (0.99, 0.8)
     assert [one["probability"] for one in record["metrics"][0]["quantiles"]] == [0.005, 0.01, 0.5, 0.99, 0.995]
+
+
+def test_a_probability_of_one_half_has_the_median_once_and_both_quartiles():
+    run = synthetic_run(300, failed=0, requirements=[], report={"probability": 0.5, "confidence": 0.8})
+    document = build(run, "run")
+    table = next(one for one in blocks_of(document, Table) if one.caption == "Percentiles of the metrics")
+    assert [column.title for column in table.columns[2:]] == ["25\u202f%", "50\u202f%", "75\u202f%"]
+    force = next(row for row in table.rows if row[0].text.startswith("peak force"))
+    expected = np.quantile(run.table["peak_force_n"], (0.25, 0.5, 0.75), method="median_unbiased")
+    np.testing.assert_allclose([cell.value for cell in force[2:]], expected)
+    assert "75\u202f%" in render_html(document).decode()
 
 
 def test_the_bound_of_a_percentile_is_the_tolerance_limit_that_the_matrix_shows():
