@@ -6,7 +6,7 @@ The page's bundle of plotly.js has scatters and bars; a field is drawn as one fi
 from base64 import b64encode
 from functools import singledispatch
 from html import escape
-from math import isfinite
+from math import floor, isfinite
 from textwrap import wrap
 from typing import Any
 
@@ -172,17 +172,20 @@ def _axis(axis: Axis, ends: tuple[float, float], characters: int) -> dict[str, A
     """The layout of one axis, in the colours of the page; characters : of a line of its label."""
     own, places = axis.ticks, axis_ticks(*ends, MOST_TICKS, log=axis.log)
     texts, power = numerals(places, axis.log)
+    most = 4 if max(map(len, texts), default=0) >= LONG else 0  # ticks; 0: as many as have room
+    if axis.whole:  # so few that plotly has no step below 1
+        most = min(floor(abs(ends[1] - ends[0])) + 1, most or MOST_TICKS)
     if own is None and axis.log:
         own = tuple(zip(places, map(number, places) if power else texts, strict=True))
     return {
         "title": {"text": _lines(axis.label, characters), "standoff": 8, "font": {"size": 13}},
         "automargin": True, "gridcolor": GRID, "linecolor": MUTED, "tickcolor": MUTED, "zeroline": False,
         "ticks": "outside", "ticklen": 4, "showline": True, **POWERS,
-        "nticks": 4 if max(map(len, texts), default=0) >= LONG else 0,
+        "nticks": most,
         "autotickangles": [0, -90] if axis.ticks else [0, 30, -90],  # names stand upright, as many as can be
         "range": [float(np.log10(end)) for end in ends] if axis.log else list(ends),
         "type": "log" if axis.log else "linear",
-        **({"tickformat": ",d"} if axis.whole else {}),
+        **({"tickformat": ",.3~f"} if axis.whole else {}),  # after zooming in 0.5 is 0.5, not 1
         **({} if own is None else {"tickvals": [at for at, _ in own],
                                    "ticktext": [_lines(text, NAME) for _, text in own]}),
     }  # fmt: skip

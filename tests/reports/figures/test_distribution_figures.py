@@ -56,6 +56,16 @@ def test_an_axis_of_large_numbers_has_their_power_of_ten_at_its_end():
     assert "×10" not in plain
 
 
+@pytest.mark.parametrize("values", [(0.0, 1.0), (3.0, 4.0, 5.0), range(9)])
+def test_an_axis_of_whole_numbers_has_no_tick_between_them(values):
+    plot = panel(np.repeat(np.asarray(values, dtype=np.float64), 6))
+    layout = screen.specifications(histograms([plot]))[0]["layout"]
+    for axis in (layout["xaxis"], layout["yaxis"]):
+        low, high = axis["range"]
+        assert 0.5 < (high - low) / axis["nticks"]  # plotly takes the next larger 1, 2 or 5 times a power of ten
+        assert axis["tickformat"] == ",.3~f"  # a tick that a zoom puts between them is not rounded
+
+
 def spoilt(n=10_000, outliers=(900.0, 1000.0, -5000.0)):
     values = np.random.Generator(np.random.Philox(key=1)).normal(0.0, 1.0, n)
     values[: len(outliers)] = outliers
