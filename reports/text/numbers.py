@@ -72,10 +72,10 @@ def number(value: float | None, digits: int = 5, scale: float | None = None, up:
 def limit_number(value: float) -> str:
     """A limit with all digits that it was given, such as those of a Julian date, also in kilometres in place of metres.
 
-    A limit that a conversion gave more digits than anybody wrote, such as 100/3, has five.
+    A limit that a conversion gave more digits than anybody wrote, such as 100/3, is told apart from bounds beside it.
     """
     given = len(Decimal(f"{value:.15g}").normalize().as_tuple().digits)  # the last digits of a double are rounding
-    return _significant(value, max(given, 5)) if given <= MOST_GIVEN else number(value)
+    return _significant(value, max(given, 5) if given <= MOST_GIVEN else MOST_DIGITS)
 
 
 def beside_limit(value: float, margin: float | None, up: bool) -> str:

@@ -216,8 +216,9 @@ def test_the_words_of_a_distribution_have_printed_signs_and_powers():
         (1.2345e-5, "1.2345·10⁻⁵"),
         (1234567.890123, "1\u202f234\u202f567.890123"),
         (1234567.890123 / 1000.0, "1234.567890123"),  # 1234.5678901229999 km: no wider than it was given in m
-        (2.5 / 86400.0, "2.894·10⁻⁵"),  # converted
-        (100.0 / 3.0, "33.333"),
+        (2.5 / 86400.0, "2.8935185·10⁻⁵"),  # converted
+        (2599850.0 / 86400.0, "30.090856"),  # days: in five digits it would be beyond a bound of 30.0909, which fails
+        (100.0 / 3.0, "33.333333"),
         (-1e50, "−1·10⁵⁰"),
     ],
 )
