@@ -109,13 +109,16 @@ class Flown:
 
     @cached_property
     def columns(self) -> dict[str, ColumnFacts]:
-        """All columns and history quantities by name."""
-        records = [*self.manifest.get("quantities", []), *self.manifest.get("columns", [])]
+        """All columns, in the order of the table, and history quantities by name; of one name the column counts."""
+        records = [*self.manifest.get("columns", []), *self.manifest.get("quantities", [])]
         facts = [
             ColumnFacts(record["name"], record.get("unit", ""), record.get("role", ""), record.get("description", ""))
             for record in records
         ]
-        return {"t_s": ColumnFacts("t_s", "s", "time", "time"), **{fact.name: fact for fact in facts}}
+        known = {"t_s": ColumnFacts("t_s", "s", "time", "time")}
+        for fact in facts:
+            known.setdefault(fact.name, fact)
+        return known
 
     def with_role(self, role: str) -> list[ColumnFacts]:
         """Columns of one role that the table holds, in order."""

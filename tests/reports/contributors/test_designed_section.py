@@ -40,6 +40,17 @@ def test_indices_stand_in_a_table_that_counts_whole_blocks(design, size, word):
     assert ("below 0 or above 1 it is an error of the estimate" in table.note) == (design == "saltelli")
 
 
+def test_an_input_that_is_also_in_the_histories_keeps_its_place_in_the_blocks():
+    """It came first in the report's list of inputs, and the indices of each input were given to another one."""
+    run = designed("saltelli")
+    expected = Flown(run, "run").contributions.by_metric["propellant_kg"]
+    oe = next(column for column in run.manifest["columns"] if column["name"] == "oe_pct")
+    both = SyntheticRun(
+        {**run.manifest, "quantities": [{**oe, "role": "output"}]}, run.table, run.nominal_row, run.history
+    )
+    assert Flown(both, "run").contributions.by_metric["propellant_kg"] == expected
+
+
 def test_too_few_blocks_are_a_sentence():
     blocks = section(designed("saltelli", 16))
     assert not [block for block in blocks if isinstance(block, Table)]
