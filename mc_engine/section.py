@@ -41,7 +41,7 @@ class ReportSection(Section):
 
     @property
     def percentiles(self) -> tuple[float, ...]:
-        """The percentiles in a report, ascending, each once: with a probability of 50 % three of them are the median."""
+        """The percentiles in a report, ascending, each once: with a probability of 50 % three are the median."""
         return tuple(sorted({*self.outer, self.low, 0.5, self.probability}))
 
     @property
