@@ -350,6 +350,8 @@ def was_looked_at(manifest: Mapping[str, Any], n_cases: int, n_flown: int | None
     >>> was_looked_at({"campaign": {"cases": 1000}}, 2000)
     True
     """
-    if n_flown is not None and n_flown < n_cases and not manifest.get("shard"):
+    shard = manifest.get("shard")
+    due = shard["stop"] - shard["first"] if shard else n_cases
+    if n_flown is not None and n_flown < due:
         return True
     return bool(manifest.get("looks")) or n_cases > manifest.get("campaign", {}).get("cases", n_cases)

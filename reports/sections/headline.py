@@ -154,11 +154,17 @@ def _same(flown: Flown, name: str, used: str) -> tuple[str, str]:
 def warnings(flown: Flown) -> tuple[str, ...]:
     """What a reader must know before using any number below."""
     sentences = []
-    missing = flown.n_wanted - flown.n_tried
-    if missing > 0:
+    shard = flown.manifest.get("shard")
+    wanted = shard["stop"] - shard["first"] if shard else flown.n_wanted  # `resume` flies no case of another shard
+    if missing := max(wanted - flown.n_tried, 0):
         sentences.append(
-            f"The run is not complete: {count(missing)} of {count(flown.n_wanted)} cases are missing; "
-            "“mc-engine resume .”, typed in the run’s folder, flies them."
+            f"The {'shard' if shard else 'run'} is not complete: {count(missing)} of {count(wanted)} cases are "
+            "missing; “mc-engine resume .”, typed in the run’s folder, flies them."
+        )
+    if shard:
+        sentences.append(
+            f"This is shard {count(shard['number'])} of {count(shard['of'])}, with {count(wanted)} of "
+            f"{count(flown.n_wanted)} cases; “mc-engine merge RUN SHARD...” makes one run of all shards."
         )
     if flown.n_tried and not flown.every.completed:
         every = "The only case" if flown.n_tried == 1 else f"All {count(flown.n_tried)} cases"

@@ -145,7 +145,9 @@ def test_a_run_was_looked_at_when_it_flew_by_looks_or_was_extended(manifest, n_c
 
 
 def test_a_shard_has_fewer_cases_as_it_was_to_have():
-    assert not was_looked_at({"campaign": {"cases": 100}, "shard": {"number": 1, "of": 2}}, 100, 50)
+    part = {"campaign": {"cases": 100}, "shard": {"number": 1, "of": 2, "first": 0, "stop": 50}}
+    assert not was_looked_at(part, 100, 50)
+    assert was_looked_at(part, 100, 49)
 
 
 SPEED = {**FUEL, "name": "speed", "metric": "speed_m_s", "at_most": None, "at_least": 5.0, "confidence": 0.95}

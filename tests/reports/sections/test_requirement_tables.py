@@ -93,6 +93,19 @@ def test_a_run_that_is_not_complete_has_the_bounds_that_hold_at_every_number_of_
     assert "The run has 1 000 of 2 000 cases so far. The bounds on probabilities hold at every number" in warned
 
 
+@pytest.mark.parametrize("flown_cases", [1000, 400])
+def test_a_shard_asks_for_its_own_missing_cases_only_and_for_a_merge(flown_cases):
+    """A complete shard was told to `resume`, which flies nothing; a cut one had the bounds of a fixed number."""
+    shard = {"number": 1, "of": 3, "first": 0, "stop": 1000}
+    run = synthetic_run(flown_cases, 0, requirements=[FUEL], campaign=mc(3000), shard=shard)
+    run.wanted = 3000
+    part, missing = Flown(run, "run"), flown_cases < 1000
+    warned = " ".join(warnings(part)).replace("\u202f", " ")
+    assert "This is shard 1 of 3, with 1 000 of 3 000 cases; “mc-engine merge RUN SHARD...”" in warned
+    assert ("The shard is not complete: 600 of 1 000 cases are missing; “mc-engine resume .”" in warned) == missing
+    assert ("not complete" in warned) == missing == part.verdicts[0].looked
+
+
 def test_a_nominal_case_that_failed_is_told():
     run = synthetic_run(500, failed=0)
     assert "nominal case failed" not in " ".join(warnings(Flown(run, "run")))
