@@ -144,6 +144,13 @@ def analyses_line(store: Store) -> str:
     return f"{history}; the verdicts hold at every number of cases at once"
 
 
+def upstream_line(store: Store) -> str:
+    """Which run the inputs come from, as a folder may have the name of a shipped campaign; empty without one."""
+    taken = store.manifest.get("upstream")
+    facts = [f"{key} {taken[key]}" for key in ("cases", "seed") if key in taken] if taken else []
+    return f"from a run of {taken['name']}: {', '.join(facts)}" if taken else ""
+
+
 def seed_line(store: Store) -> str:
     """That the campaign has the seed of the one upstream; else empty."""
     return seed_remark(store.manifest["campaign"].get("seed"), store.manifest.get("upstream"))

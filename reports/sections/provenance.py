@@ -13,6 +13,8 @@ def provenance_table(flown: Flown) -> Table:
     campaign = flown.campaign
     cases = f"{count(flown.n_tried)} / {count(flown.n_wanted)}"
     own = [("design", flown.design), ("seed", campaign.get("seed", "")), ("cases flown / required", cases)]
+    before = flown.manifest.get("upstream") or {}
+    own += [(f"run upstream: {key}", before.get(key, "")) for key in ("name", "design", "seed", "cases", "digest")]
     return origin_table("run", flown.name, flown.manifest, own, _timing_facts(flown))
 
 

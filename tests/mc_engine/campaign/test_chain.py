@@ -135,6 +135,8 @@ def test_campaigns_with_one_seed_are_said_to_draw_alike(folder, tmp_path, seed):
     flown = call("run", tmp_path / "second", "--out", tmp_path / "run")
     assert (checked.exit_code, flown.exit_code) == (0, 0)
     page = (tmp_path / "run" / "report.html").read_text()
+    assert "inputs       from a run of first: cases 40, seed 1" in flown.stdout
+    assert "run upstream: digest" in page
     for said, words in ((checked.stdout, "seed 1 is"), (flown.stdout, "seed         1 is"), (page, "The seed 1 is")):
         assert (f"{words} also that of first: noise in flight" in said) == (seed == 1)
 
