@@ -178,6 +178,12 @@ def test_provenance_holds_seed_digests_and_versions(document):
     assert "uncommitted" in rows["git"]
 
 
+def test_a_few_failed_cases_of_very_many_are_not_said_to_be_none():
+    table = tables(build(synthetic_run(30_000, failed=1), RUN))["Completion of the cases"]
+    fractions = {row[0]: row[2].replace("\u202f", " ") for row in cells(table)}
+    assert fractions == {"ok": "99.996 %", "not-finite": "0.01 %", "": "0.01 %", "all": "100 %"}
+
+
 def test_an_unfinished_run_says_so_and_how_to_finish_it():
     run = synthetic_run(500, failed=0)
     run.wanted = 2000
