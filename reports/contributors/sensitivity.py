@@ -14,7 +14,7 @@ from reports.drawing.marks import Drawing
 from reports.figures.statistics import success_panel
 from reports.run.flown import Flown
 from reports.run.outcomes import failures
-from reports.text.numbers import count, number, p_value, percent
+from reports.text.numbers import count, counted, number, p_value, percent
 
 MOST_DRIVERS = 12
 MOST_PANELS = 6
@@ -70,8 +70,8 @@ def _driver_blocks(
     elif drivers.singles_tested:
         yield (
             f"No input{', and no pair of inputs,' * bool(drivers.pairs_tested)} separates failed from passed cases "
-            f"beyond chance ({count(drivers.singles_tested)} tests of single inputs, {count(drivers.pairs_tested)} of "
-            f"pairs, at a false-discovery rate of {percent(FALSE_DISCOVERIES)})."
+            f"beyond chance ({counted(drivers.singles_tested, 'test')} of single inputs, "
+            f"{count(drivers.pairs_tested)} of pairs, at a false-discovery rate of {percent(FALSE_DISCOVERIES)})."
         )
     if drivers.undecided:
         yield (
@@ -97,7 +97,7 @@ def _driver_table(flown: Flown, drivers: Drivers, failed: Mapping[str, np.ndarra
     rows = tuple(_driver_row(flown, driver, failed) for driver in told)
     left_out = len(drivers.singles) + len(drivers.pairs) - len(told)
     note = (
-        f"{count(drivers.singles_tested)} tests of single inputs and {count(drivers.pairs_tested)} of pairs; "
+        f"{counted(drivers.singles_tested, 'test')} of single inputs and {count(drivers.pairs_tested)} of pairs; "
         f"false-discovery rate of each kind at most {percent(FALSE_DISCOVERIES)} (Benjamini–Hochberg). "
         "Separation: Cliff’s delta, 1 if all failed cases are separated from all passed ones, 0 if none. A pair is "
         "listed if its inputs act together: failures depend on both beyond what each explains alone. Its separation is "

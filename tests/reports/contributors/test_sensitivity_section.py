@@ -183,6 +183,16 @@ def test_few_failed_and_equal_cases_are_drawn_or_said(cases):
             assert "Not tested for contributors to failures" in said(found)
 
 
+def test_a_single_test_for_contributors_to_failures_is_one_test():
+    run = synthetic_run(500, failed=0)
+    run.manifest["requirements"] = [
+        {"name": "force", "metric": "peak_force_n", "at_most": 60.0, "share": 0.9, "confidence": 0.9}
+    ]
+    run.table["oe_pct"] = 0.0
+    note = block(section(run), Table, "What separates failed").note
+    assert note.startswith("1 test of single inputs and 0 of pairs;")
+
+
 def test_without_a_driver_the_report_says_how_many_tests_found_none():
     run = synthetic_run(1000, failed=0)
     luck = np.random.Generator(np.random.Philox(key=4)).random(1000)
