@@ -24,6 +24,10 @@ from typing import Any
 _PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
 _MIB = 2**20
 _SET_PARENT_SIGNAL, _SET_SUBREAPER = 1, 36  # of prctl
+# a line of a stack trace: of gfortran and sanitizers, of Java and the C library, of Octave
+_FRAME = re.compile(
+    r"#\d+\s+0x.*|at \S+(?::\d+|\(.*\))|\S+ at line \d+ column \d+|.*\b[Bb]acktrace:|error: called from"
+)
 HELD_S = 5.0  # longer than the engine needs to end its processes
 _LINUX = sys.platform.startswith("linux")
 # sent by the system to a process whose parent has died, which then ends what it began; no job manager sends it
@@ -43,8 +47,13 @@ def how_it_ended(code: int) -> str:
 
 
 def last_lines(stderr: bytes) -> str:
-    """The last three lines of what was written to stderr, to be put at the end of a sentence."""
+    """The last three lines of what was written to stderr, to be put at the end of a sentence.
+
+    The frames of a stack trace are left out. Most programs write them after their message, and those of gfortran are
+    other addresses in every process.
+    """
     lines = [line.strip() for line in stderr.decode(errors="replace").splitlines() if line.strip()]
+    lines = [line for line in lines if not _FRAME.fullmatch(line)] or lines
     return f": {' | '.join(lines[-3:])}" if lines else ""
 
 

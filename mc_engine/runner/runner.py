@@ -30,6 +30,7 @@ from mc_engine.runner.progress import ProgressCall
 from mc_engine.runner.sessions import Session, complete, count_of, fly_failed, session_of
 from mc_engine.runner.shards import Shard, merge_shards
 from mc_engine.sampling.designs import block_problem, extension_problem
+from mc_engine.status import CRASHED, STATUS_NAME
 from mc_engine.store.case_rows import recorded_cases
 from mc_engine.store.opening import open_store
 from mc_engine.store.parts import PART_FOLDERS
@@ -290,10 +291,12 @@ def replay(path: str | Path, case_id: int) -> Replay:
     name_upstream(campaign, np.array([case_id]), flight)
     stored = store.row(case_id)
     again = {**table, **flight}
+    # the reason of a crash has the words of the program, perhaps with a time, an address or the number of a process
+    crashed = stored["status"] == flight["status"][0] == STATUS_NAME[CRASHED]
     differences = [
         f"case {case_id}, {name}: stored {stored[name]!r}, now {value!r}"
         for name, value in ((name, np.asarray(column).tolist()[0]) for name, column in again.items())
-        if flyer.differs(stored[name], value)
+        if flyer.differs(stored[name], value) and not (name == "reason" and crashed)
     ]
     lost = flyer.lost_number(inputs, noise, flight, f"case {case_id}")
     frame = history_frame(case_id, history)

@@ -50,6 +50,40 @@ sigma = 0.5
         assert reason in row["reason"]
 
 
+def test_the_reason_of_a_crash_is_the_message_of_a_fortran_program_and_its_replay_has_the_same_bits(tmp_path):
+    program = tmp_path / "fall"  # writes what gfortran does; addresses and the time are others in every process
+    program.write_text("""#!/bin/sh
+echo "At line 8 of file fall.f90 (unit = 10, file = 'fall.nml')
+Fortran runtime error: Cannot match namelist object name .0 (process $$)
+
+Error termination. Backtrace:
+#0  0x7fb6$$c2 in ???
+#8  0x7fb6$$49 in __libc_start_call_main
+\tat ../sysdeps/nptl/libc_start_call_main.h:58
+#9  0xffffffffffffffff in ???" >&2
+exit 2
+""")
+    program.chmod(0o755)
+    (tmp_path / "campaign.toml").write_text("""
+[campaign]
+cases = 1
+design = "mc"
+seed = 3
+[simulator]
+command = ["./fall"]
+result = "result.json"
+parameter.mass_kg = { default = 10.0 }
+metric.fall_time_s = {}
+[dispersion.mass_kg]
+dist = "normal"
+sigma = 0.5
+""")
+    store = run(load_campaign(tmp_path / "campaign.toml"), tmp_path / "run", workers=1)
+    why = "At line 8 of file fall.f90 (unit = 10, file = 'fall.nml') | Fortran runtime error: Cannot match namelist "
+    assert store.row(0)["reason"].startswith(f"ended with exit code 2: {why}object name .0 (process ")
+    assert replay(tmp_path / "run", 0).differences == ()
+
+
 def test_a_pattern_that_is_searched_for_too_long_gives_no_result(monkeypatch):
     monkeypatch.setattr(program_flight, "BOUNDED_S", 0.2)
     sentence = 'the search of stdout for "(a+)+$", by which "time_s" is read, takes longer than 0.2 s'
