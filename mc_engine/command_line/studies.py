@@ -30,6 +30,8 @@ from mc_engine.command_line.app import (
 from mc_engine.command_line.flight import finish
 from mc_engine.command_line.next_step import after_search
 from mc_engine.interruption import NOTHING_BEGUN, advise, in_threads, raise_if_signalled
+from mc_engine.suggestions import listed
+from mc_engine.text import clean
 
 if TYPE_CHECKING:
     from mc_engine.campaign.loading import Campaign
@@ -65,7 +67,11 @@ def import_(
 
     loaded = load_campaign(campaign, cases=cases)
     refuse_occupied_folder(out)
-    finish(import_results(loaded, results, out, history), no_report)
+    store = import_results(loaded, results, out, history)
+    if left_out := store.manifest["imported"]["left_out"]:
+        what = f"not imported, as no dispersed inputs or metrics of the campaign: the columns {listed(left_out)}"
+        typer.echo(clean(f"{results.name}: {what}"), err=True)
+    finish(store, no_report)
 
 
 @app.command()

@@ -29,6 +29,7 @@ from mc_engine.store.store import Store, create_store
 from mc_engine.suggestions import hint
 
 _SAME = 1e-9  # of an input, which a CSV may round
+_NO_METRICS = ("case_id", "status", "reason")
 _MOST = 20  # problems of one table
 
 
@@ -45,7 +46,8 @@ def import_results(campaign: Campaign, file: Path, out: Path, history: Path | No
     rows, nominal = _results(campaign, file, table, problems)
     if problems:
         raise CampaignError(file.name, problems[:_MOST])
-    imported = {"file": file.name, "history": None if history is None else history.name}
+    left_out = [name for name in table if name not in (*rows, *_NO_METRICS)]
+    imported = {"file": file.name, "history": None if history is None else history.name, "left_out": left_out}
     manifest = {**manifest_of(campaign), "imported": imported}
     columns = [column for column in columns_of(campaign) if column.name in rows]  # states of a model are not in tables
     store = create_store(out, manifest, campaign.text, columns, companions_of(campaign))
@@ -105,7 +107,8 @@ def _wrong_ids(campaign: Campaign, ids: np.ndarray) -> list[Problem]:
         return problems
     if missing.size:
         has = f"the campaign has the cases 0 to {campaign.cases - 1}; --cases takes another number of them"
-        return [Problem("case_id", f"case {missing[0]} is missing; {has}")]
+        failed = 'a case that failed needs a row, too, with a status such as "crashed"'
+        return [Problem("case_id", f"case {missing[0]} is missing; {has}; {failed}")]
     twice = given[counts > 1]
     return [Problem("case_id", f"case {twice[0]:.0f} is there twice; remove one of its rows")] if twice.size else []
 

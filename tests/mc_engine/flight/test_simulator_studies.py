@@ -212,6 +212,20 @@ def test_imported_histories_are_those_of_a_run(tmp_path, flown):
     assert '"history.csv" has no column "speed_m_s"' in told(*words, "--out", tmp_path / "other", status=2)
 
 
+def test_a_failed_case_of_elsewhere_is_a_row_with_a_status_and_other_columns_are_named(tmp_path, flown):
+    campaign, table, file = python_campaign(tmp_path / "ball", cases=60), flown.cases(), tmp_path / "results.csv"
+    table.loc[7, ["status", "reason", "fall_time_s", "impact_speed_m_s"]] = ["crashed", "no licence", None, None]
+    table.assign(drag_area_m2=1.0).to_csv(file, index=False)
+    words = ["import", file, "--campaign", campaign, "--no-report", "--out"]
+    named = 'results.csv: not imported, as no dispersed inputs or metrics of the campaign: the columns "drag_area_m2"'
+    assert named in told(*words, tmp_path / "run")
+    assert open_store(tmp_path / "run").row(7)["reason"] == "no licence"
+    table.drop(index=7).to_csv(file, index=False)
+    said = told(*words, tmp_path / "other", status=2)
+    assert "case 7 is missing" in said
+    assert 'a case that failed needs a row, too, with a status such as "crashed"' in said
+
+
 def test_a_table_without_a_number_is_not_blamed_on_the_model(tmp_path, flown):
     campaign = python_campaign(tmp_path / "ball", cases=60)
     metrics = [column.name for column in flown.columns if column.role == "metric"]
