@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 PROGRAM_ID = "program_id"  # file with the process group of the program in flight, for whoever must end it
 BOUNDED_S, TEMPLATE_MIB = 10.0, 2048  # that a template or a pattern may take for one case
 JOB_ENDS_S = 0.2  # in which all processes of a job that is ended have SIGTERM: this one is then held up, and ended
+_FORTRAN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)[dD][+-]?\d+")  # a number that `is_number` does not take
 LOOK_EVERY_S = 0.02  # between two looks at the memory of a program, and whether it has ended
 MOST_STDOUT, MOST_STDERR, MOST_RESULT = 2**24, 2**16, 2**26  # bytes
 _MIB, _LINUX = 2**20, sys.platform.startswith("linux")
@@ -351,7 +352,8 @@ def _number(name: str, document: Any, path: str | None, pattern: str | None, std
     if sometimes and text in ("", "null"):
         return float("nan")
     if isinstance(value, bool) or not is_number(text):
-        raise ValueError(f'"{name}" is {clean(text)[:60] or "empty"}, which is no number')
+        way_out = "; write its exponent with the letter E" if _FORTRAN.fullmatch(text) else ""
+        raise ValueError(f'"{name}" is {clean(text)[:60] or "empty"}, which is no number{way_out}')
     return float(text)
 
 

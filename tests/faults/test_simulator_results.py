@@ -17,6 +17,11 @@ RESULTS = {
     "nothing": ('{"time": null}', "ok", ""),  # of a metric that may be missing
     "large": ('{"time": 1%s}' % ("0" * 400), "not-finite", '"fall_time_s" is infinite'),
     "groups": ('{"time": "1_000"}', "no-result", '"fall_time_s" is 1_000, which is no number'),
+    "Fortran": (
+        '{"time": "0.15D+01"}',
+        "no-result",
+        '"fall_time_s" is 0.15D+01, which is no number; write its exponent with the letter E',
+    ),
     "digits": ('{"time": "\u0661"}', "no-result", '"fall_time_s" is \u0661, which is no number'),
     "truth": ('{"time": true}', "no-result", '"fall_time_s" is true, which is no number'),
     "twice": ('{"time": 1.0, "time": 2.0}', "no-result", '"fall_time_s" is [1.0, 2.0], which is no number'),
