@@ -69,14 +69,14 @@ def _timing_facts(flown: Flown) -> Iterator[tuple[str, str]]:
 
 def campaign_facts(flown: Flown) -> tuple[tuple[str, str], ...]:
     """The facts below the title: campaign, model, cases, design, date, engine."""
-    campaign = flown.campaign
+    campaign, imported = flown.campaign, flown.manifest.get("imported")
+    came = f"flown of {count(flown.n_wanted)}"
+    if imported:
+        came = f"imported from {exact(imported['file'])}, not flown by the engine"
     facts = (
         ("Campaign", str(campaign.get("name", ""))),
         ("Model", str(flown.manifest.get("model", {}).get("title", ""))),
-        (
-            "Cases",
-            f"{count(flown.n_tried)} flown of {count(flown.n_wanted)}, {count(flown.every.completed)} completed",
-        ),
+        ("Cases", f"{count(flown.n_tried)} {came}, {count(flown.every.completed)} completed"),
         ("Design", f"{flown.design}, seed {exact(str(campaign.get('seed', '–')))}"),
         ("Run", str(flown.manifest.get("created_utc", ""))[:16].replace("T", " ") + " UTC"),
         ("Engine", f"mc-engine {flown.manifest.get('engine', '')}"),

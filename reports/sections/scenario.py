@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from mc_engine.statistics import Summary
 from mc_engine.store.manifest_file import seed_remark
+from mc_engine.store.run_files import NO_NOMINAL
 from mc_engine.units import UNITS, convert
 from reports.document.blocks import Cell, Column, Table
 from reports.run.chosen_units import chosen_unit, spread_text
@@ -44,11 +45,11 @@ def _vehicle(flown: Flown) -> str:
     said = [f"{model['title']}." if model.get("title") else ""]
     said.append(f"Source of the model: {model['source'].rstrip('.')}." if model.get("source") else "")
     dispersed = counted(len(flown.with_role("dispersion")), "dispersed input")
-    said.append(
-        f"{counted(flown.n_wanted, 'case')} of the design “{flown.design}”{_design_words(flown)} with {dispersed}, and "
-        "one nominal case with "
-        "all inputs at their nominal values."
-    )
+    nominal = ", and one nominal case with all inputs at their nominal values"
+    if flown.nominal.get("reason") == NO_NOMINAL:
+        nominal = ""
+    design = f"the design “{flown.design}”{_design_words(flown)}"
+    said.append(f"{counted(flown.n_wanted, 'case')} of {design} with {dispersed}{nominal}.")
     if upstream:
         said.append(f"Each case continues a case of the run of {upstream['name']}.")
         alike = seed_remark(flown.manifest["campaign"].get("seed"), upstream)

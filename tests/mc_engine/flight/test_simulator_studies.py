@@ -220,6 +220,10 @@ def test_a_failed_case_of_elsewhere_is_a_row_with_a_status_and_other_columns_are
     named = 'results.csv: not imported, as no dispersed inputs or metrics of the campaign: the columns "drag_area_m2"'
     assert named in told(*words, tmp_path / "run")
     assert open_store(tmp_path / "run").row(7)["reason"] == "no licence"
+    told("report", tmp_path / "run", "--format", "md")
+    report = (tmp_path / "run/report.md").read_text()
+    assert "Cases: 60 imported from results.csv, not flown by the engine, 59 completed" in report
+    assert "(independent random draws) with 2 dispersed inputs.\n" in report  # no nominal case, as the table has none
     table.drop(index=7).to_csv(file, index=False)
     said = told(*words, tmp_path / "other", status=2)
     assert "case 7 is missing" in said
