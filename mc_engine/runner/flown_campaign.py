@@ -125,7 +125,7 @@ def refuse_undeclared_data(campaign: Campaign) -> None:
             _start_from(campaign, folder)
         except EngineError as error:
             why = str(error).replace(f"{folder}{os.sep}", "")
-            kept = "a run keeps copies only of the model's sources and of the files in model(..., data=...)"
+            kept = "a run keeps copies only of the model's sources and of the files that its `data` names"
             raise ModelError(f"{why}; {kept}") from None
 
 

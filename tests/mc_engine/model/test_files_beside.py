@@ -197,7 +197,7 @@ def test_a_file_that_is_read_and_not_declared_is_named_before_anything_flies(lat
         done = said(tmp_path, *command)
         assert done.returncode == 2
         assert ("table.csv" if later else "factors.csv") in done.stderr
-        assert "a run keeps copies only of the model's sources and of the files in model(..., data=...)" in done.stderr
+        assert "a run keeps copies only of the model's sources and of the files that its `data` names" in done.stderr
         assert str(tmp_path) not in done.stderr
         assert not (tmp_path / "run").exists()
 
