@@ -163,7 +163,7 @@ def program_simulator(section: SimulatorSection, directory: Path, problems: Prob
         problems.append(("result", f'"{section.result}" ends in neither .json nor .csv'))
     if section.echo is not None and not (section.result or "").endswith(".json"):
         problems.append(("echo", 'is a path in a JSON result; give `result`, such as "result.json"'))
-    if section.output and section.history is None:
+    if section.output and section.history is None and command:  # without a program, `import --history` brings them
         problems.append(("output", "there is no `history` to read these columns from"))
     if problems:
         return None

@@ -212,6 +212,31 @@ def test_imported_histories_are_those_of_a_run(tmp_path, flown):
     assert '"history.csv" has no column "speed_m_s"' in told(*words, "--out", tmp_path / "other", status=2)
 
 
+def test_histories_are_imported_for_a_table_that_describes_only_a_simulator(tmp_path):
+    (tmp_path / "campaign.toml").write_text("""
+[campaign]
+cases = 2
+design = "mc"
+seed = 3
+[simulator.parameter]
+mass_kg = { default = 10.0 }
+[simulator.metric]
+range_km = {}
+[simulator.output]
+height_m = {}
+[dispersion.mass_kg]
+dist = "normal"
+sigma = 0.5
+""")
+    file, past = tmp_path / "results.csv", tmp_path / "history.csv"
+    told("sample", tmp_path / "campaign.toml", "--out", file)
+    pd.read_csv(file).assign(range_km=1.0).to_csv(file, index=False)
+    past.write_text("case_id,t_s,height_m\n0,0,1\n0,1,2\n")
+    words = ["import", file, "--campaign", tmp_path / "campaign.toml", "--history", past, "--out", tmp_path / "run"]
+    told(*words, "--no-report")
+    assert open_store(tmp_path / "run").histories()["height_m"].tolist() == [1.0, 2.0]
+
+
 def test_a_failed_case_of_elsewhere_is_a_row_with_a_status_and_other_columns_are_named(tmp_path, flown):
     campaign, table, file = python_campaign(tmp_path / "ball", cases=60), flown.cases(), tmp_path / "results.csv"
     table.loc[7, ["status", "reason", "fall_time_s", "impact_speed_m_s"]] = ["crashed", "no licence", None, None]
