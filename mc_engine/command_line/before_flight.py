@@ -69,6 +69,7 @@ def check(
     A few cases are flown in a separate process.  All results must exist and not depend on the other cases in the batch,
     every dispersion must have an effect, no metric may be a fixed number, and every event must happen.
     """
+    from mc_engine.runner.flown_campaign import copies_of
     from mc_engine.store.manifest_file import seed_remark
 
     with _flights_beside(file) if model else nullcontext() as process:
@@ -83,8 +84,10 @@ def check(
     )
     if alike := seed_remark(campaign.seed, campaign.upstream.rows.facts if campaign.upstream else None):
         typer.echo(f"seed {alike}")
-    for line in flyer.remarks() if model else []:
-        typer.echo(line)
+    if model:
+        with copies_of(campaign) as copies:
+            for line in flyer.remarks(copies):
+                typer.echo(line)
 
 
 @contextmanager

@@ -227,12 +227,8 @@ def finish(
     judged, joint = summary.outcomes(store)
     for verdict in (*judged, joint) if joint is not None else judged:
         typer.echo(f"requirement  {summary.verdict_line(verdict, store.units)}")
-    if taken := summary.upstream_line(store):
-        typer.echo(f"inputs       {taken}")
-    if alike := summary.seed_line(store):
-        typer.echo(f"seed         {alike}")
-    if coarse := summary.integration_line(store):
-        typer.echo(f"integration  {coarse}")
+    for name, remark in summary.remarks(store):
+        typer.echo(f"{name:12} {remark}")
     for report_path in reports:
         typer.echo(f"report       {report_path}")
     if url is not None:

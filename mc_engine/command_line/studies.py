@@ -30,8 +30,6 @@ from mc_engine.command_line.app import (
 from mc_engine.command_line.flight import finish
 from mc_engine.command_line.next_step import after_search
 from mc_engine.interruption import NOTHING_BEGUN, advise, in_threads, raise_if_signalled
-from mc_engine.suggestions import listed
-from mc_engine.text import clean
 
 if TYPE_CHECKING:
     from mc_engine.campaign.loading import Campaign
@@ -67,11 +65,7 @@ def import_(
 
     loaded = load_campaign(campaign, cases=cases)
     refuse_occupied_folder(out)
-    store = import_results(loaded, results, out, history)
-    if left_out := store.manifest["imported"]["left_out"]:
-        what = f"not imported, as no dispersed inputs or metrics of the campaign: the columns {listed(left_out)}"
-        typer.echo(clean(f"{results.name}: {what}"), err=True)
-    finish(store, no_report)
+    finish(import_results(loaded, results, out, history), no_report)
 
 
 @app.command()

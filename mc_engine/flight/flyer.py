@@ -106,8 +106,11 @@ class Flyer(ABC):
         process : one of `mc_engine.flight.contract_flight`, which has loaded the campaign and waits to fly.
         """
 
-    def remarks(self) -> list[str]:
-        """Lines for `check` on a simulator that is sound: is it deterministic, how long does a case take."""
+    def remarks(self, copies: Path | None) -> list[str]:
+        """Lines for `check` on a simulator that is sound: is it deterministic, how long does a case take.
+
+        copies : folder of those that a run keeps of the model's files, None if the model is no file.
+        """
         return []
 
     @abstractmethod

@@ -125,10 +125,11 @@ class SimulatorFlyer(Flyer):
         columns = self.fly(full_inputs(self._campaign, table), noise)
         return [{name: column[k] for name, column in columns.items()} for k in range(len(noise))]
 
-    def remarks(self) -> list[str]:
+    def remarks(self, copies: Path | None) -> list[str]:
         """Deterministic or not, metrics that no input moves, seconds a case, hours for the campaign here.
 
-        The nominal and one dispersed case are flown in two processes, which differ in what was flown before.
+        The nominal and one dispersed case are flown in two processes, which differ in what was flown before; in the
+        second one from the copies, as `replay` and `extend` do.
         """
         ids = np.array([0])
         table = {} if self._campaign.first is not None else case_table(self._campaign, ids)
@@ -141,7 +142,14 @@ class SimulatorFlyer(Flyer):
         first, dispersed = self._flown(nominal, {})[0], self._flown(ids, table)[0]
         seconds = (time.perf_counter() - begin) / 2
         self.process().end()  # before another starts, which may need its licence
-        dispersed_again, first_again = self._flown(ids, table)[0], self._flown(nominal, {})[0]
+        again = self
+        if copies is not None and not self.simulator.is_described:
+            again = SimulatorFlyer(replace(self._campaign, directory=copies))
+        dispersed_again, first_again = again._flown(ids, table)[0], again._flown(nominal, {})[0]
+        if again is not self and first["status"] == STATUS_NAME[OK] != first_again["status"]:
+            why = str(first_again["reason"]).replace(f"{copies}{os.sep}", "")
+            return [f"from the copies of its files that a run keeps, as `replay` and `extend` fly it, the nominal case "
+                    f"ends as {first_again['status']}: {why}; name files that it reads in `data`"]  # fmt: skip
         pairs = (first, first_again), (dispersed, dispersed_again)
         differing = [name for name in self._names if any(other_bits(a[name], b[name]) for a, b in pairs)]
         lines = ["deterministic: two flights of two cases, in two processes, give the same bits"]

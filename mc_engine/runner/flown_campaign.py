@@ -4,6 +4,8 @@
 """
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -109,18 +111,28 @@ def _files_of_model(campaign: Campaign) -> dict[str, bytes]:
     return {_name_in(base, path): content for path, content in sorted({**sources.files, **sources.data}.items())}
 
 
-def refuse_undeclared_data(campaign: Campaign) -> None:
-    """ModelError if the model does not work with the copies of its files that a run keeps.
-
-    The cause is a data file that is not named in `data`.  A file outside the model's folder is not detected.
-    """
+@contextmanager
+def copies_of(campaign: Campaign) -> Iterator[Path | None]:
+    """A folder, for the block, of the copies that a run keeps of the model's files; None if the model is no file."""
     if not (files := _files_of_model(campaign)):
+        yield None
         return
     with TemporaryDirectory(prefix="mc-engine-") as name:
         folder = Path(name).resolve()
         for file, content in files.items():
             make_way(folder, file)
             write_inside(folder, file, content)
+        yield folder
+
+
+def refuse_undeclared_data(campaign: Campaign) -> None:
+    """ModelError if the model does not work with the copies of its files that a run keeps.
+
+    The cause is a data file that is not named in `data`.  A file outside the model's folder is not detected.
+    """
+    with copies_of(campaign) as folder:
+        if folder is None:
+            return
         try:
             _start_from(campaign, folder)
         except EngineError as error:

@@ -14,6 +14,8 @@ from mc_engine.store.manifest_file import seed_remark
 from mc_engine.store.parts import CASE_COLUMNS, Column, Part, numbers_in, read_part, rows_with
 from mc_engine.store.run_files import NO_NOMINAL
 from mc_engine.store.store import Store
+from mc_engine.suggestions import listed
+from mc_engine.text import clean
 
 if TYPE_CHECKING:
     import numpy as np
@@ -144,14 +146,26 @@ def analyses_line(store: Store) -> str:
     return f"{history}; the verdicts hold at every number of cases at once"
 
 
-def upstream_line(store: Store) -> str:
+def remarks(store: Store) -> Iterator[tuple[str, str]]:
+    """(word, what must be known of the run): where its inputs and results come from, its seed, its steps."""
+    lines = {"inputs": _upstream, "imported": _not_imported, "seed": _seed, "integration": integration_line}
+    return ((word, told) for word, line in lines.items() if (told := line(store)))
+
+
+def _upstream(store: Store) -> str:
     """Which run the inputs come from, as a folder may have the name of a shipped campaign; empty without one."""
     taken = store.manifest.get("upstream")
     facts = [f"{key} {taken[key]}" for key in ("cases", "seed") if key in taken] if taken else []
     return f"from a run of {taken['name']}: {', '.join(facts)}" if taken else ""
 
 
-def seed_line(store: Store) -> str:
+def _not_imported(store: Store) -> str:
+    """The columns of a table of results that were not imported; else empty."""
+    names = store.manifest.get("imported", {}).get("left_out")
+    return clean(f"without {listed(names)}: no dispersed inputs or metrics of the campaign") if names else ""
+
+
+def _seed(store: Store) -> str:
     """That the campaign has the seed of the one upstream; else empty."""
     return seed_remark(store.manifest["campaign"].get("seed"), store.manifest.get("upstream"))
 

@@ -242,7 +242,7 @@ def test_a_failed_case_of_elsewhere_is_a_row_with_a_status_and_other_columns_are
     table.loc[7, ["status", "reason", "fall_time_s", "impact_speed_m_s"]] = ["crashed", "no licence", None, None]
     table.assign(drag_area_m2=1.0).to_csv(file, index=False)
     words = ["import", file, "--campaign", campaign, "--no-report", "--out"]
-    named = 'results.csv: not imported, as no dispersed inputs or metrics of the campaign: the columns "drag_area_m2"'
+    named = 'imported     without "drag_area_m2": no dispersed inputs or metrics of the campaign'
     assert named in told(*words, tmp_path / "run")
     assert open_store(tmp_path / "run").row(7)["reason"] == "no licence"
     told("report", tmp_path / "run", "--format", "md")
@@ -261,6 +261,20 @@ def test_a_table_without_a_number_is_not_blamed_on_the_model(tmp_path, flown):
     flown.cases().assign(**dict.fromkeys(metrics, np.nan)).to_csv(tmp_path / "results.csv", index=False)
     words = ["import", tmp_path / "results.csv", "--campaign", campaign, "--out", tmp_path / "run", "--no-report"]
     assert "no case completed; the column `reason` of its cases says why" in told(*words)
+
+
+def test_check_tells_of_files_that_fly_reads_and_a_run_keeps_no_copy_of(tmp_path):
+    fault = "inputs['mass_kg'] *= float(open(__file__.replace('sim.py', 'scale.txt')).read())"
+    file = python_campaign(tmp_path / "ball", fault=fault)
+    (file.parent / "scale.txt").write_text("1.1")
+    said = CliRunner().invoke(app, ["check", str(file)])
+    assert said.exit_code == 0
+    assert "from the copies of its files that a run keeps" in said.stdout
+    assert "ends as crashed" in said.stdout
+    assert "No such file or directory: 'scale.txt'; name files that it reads in `data`" in said.stdout
+    source = file.parent / "sim.py"
+    source.write_text(source.read_text().replace("    fly=fly,", '    fly=fly,\n    data=("scale.txt",),'))
+    assert CliRunner().invoke(app, ["check", str(file)]).stdout.splitlines()[1].startswith("deterministic")
 
 
 def test_check_tells_of_declared_outputs_of_which_no_history_comes(tmp_path):
