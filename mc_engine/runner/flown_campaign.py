@@ -46,6 +46,9 @@ def campaign_of(store: "Store", directory: Path | None = None) -> Campaign:
     flown_by = model.get("digest"), model.get("sampling_digest"), contract
     if None in (*flown_by, recorded.get("digest"), recorded.get("design"), recorded.get("seed")):
         raise StoreError(f"{store.path}: its manifest does not say how the campaign was flown; run the campaign anew")
+    other_sources = StoreError(f"{store.path}: {_other_sources(store.manifest.get('engine'), engine_version())}")
+    if (sampling_digest(), SEED_CONTRACT) != flown_by[1:]:  # first: an older file or model may no longer be readable
+        raise other_sources
     sensitivity = store.manifest.get("sensitivity")
     drawn = sensitivity if sensitivity is not None else {"design": recorded["design"], "cases": store.n_cases}
     cases = drawn["cases"] if drawn["design"] in ("lhs", *EXTENSIBLE) else None
@@ -61,9 +64,8 @@ def campaign_of(store: "Store", directory: Path | None = None) -> Campaign:
         campaign = companion(campaign)
     if campaign.digest != recorded["digest"]:
         raise StoreError(f"{store.path}: a file of the campaign was edited; run the campaign anew")
-    ours = flyer_of(campaign).digest(), sampling_digest(), SEED_CONTRACT
-    if ours != flown_by or (*CASE_COLUMNS, *columns_of(campaign)) != store.columns:
-        raise StoreError(f"{store.path}: {_other_sources(store.manifest.get('engine'), engine_version())}")
+    if flyer_of(campaign).digest() != flown_by[0] or (*CASE_COLUMNS, *columns_of(campaign)) != store.columns:
+        raise other_sources
     return campaign
 
 

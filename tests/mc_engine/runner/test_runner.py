@@ -167,12 +167,19 @@ def test_a_run_of_other_sources_is_neither_continued_nor_replayed(flown, monkeyp
     assert damage(flown.path) == []
 
 
-def test_the_version_that_flew_a_run_is_named(flown, monkeypatch):
+def unreadable(*_, **__):
+    raise ModelError("model.py, line 3: a record of an older version")
+
+
+@pytest.mark.parametrize("load", [load_campaign, unreadable], ids=["model readable", "model unreadable"])
+def test_the_version_that_flew_a_run_is_named(flown, monkeypatch, load):
     monkeypatch.setattr(manifest, "sampling_digest", lambda: "another")
     monkeypatch.setattr(manifest, "engine_version", lambda: "9.1")
+    monkeypatch.setattr("mc_engine.runner.flown_campaign.load_campaign", load)
     present = flown.manifest["engine"]
-    with pytest.raises(StoreError, match=f"was flown by mc-engine {present}, and this is 9.1; use that version"):
-        runner.resume(flown.path)
+    for act in (runner.resume, lambda path: runner.replay(path, 0), lambda path: runner.extend(path, 3000)):
+        with pytest.raises(StoreError, match=f"was flown by mc-engine {present}, and this is 9.1; use that version"):
+            act(flown.path)
 
 
 @pytest.mark.parametrize("folder", ["sampling", "campaign"])
