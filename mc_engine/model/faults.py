@@ -52,7 +52,13 @@ _FUNCTIONS = {"sqrt": "the square root", "log": "the logarithm", "asin": "the ar
 _ENGINE = Path(__file__).resolve().parents[1]
 _PYTHON = Path(sysconfig.get_path("stdlib")).resolve()
 _OF_0_1 = "CHANGELOG.md says under 0.2.0 how to convert a model of version 0.1"
-_SAID_OF_0_1 = {"Field": "positional", "Parameter": "multiple values", "Setting": "multiple values"}  # by Python
+_INSTEAD_OF_0_1 = {  # functions of version 0.1, and what replaces them
+    "body_matrix": "to_matrix of mc_engine.physics.rotations",
+    "quaternion_product": "product of mc_engine.physics.rotations",
+    "mach_table": "curve of mc_engine.physics.curves",
+    "over_mach": "curve of mc_engine.physics.curves",
+}
+_RECORDS_OF_0_1 = ("Field", "Parameter", "Setting")  # whose arguments had another order
 _LONG = 60  # characters of a source line in a sentence
 
 
@@ -209,7 +215,8 @@ def wrong_record(error: BaseException) -> str:
     wrong = re.search("unexpected keyword argument '(\\w+)'", call[2])
     near = nearest(wrong[1], known) if wrong else None
     meant = f'; did you mean "{near}"?' if near else ""
-    old = f"; {_OF_0_1}" if _SAID_OF_0_1.get(call[1], "\n") in call[2] else ""
+    reordered = call[1] in _RECORDS_OF_0_1 and re.search("multiple values|were given", call[2])
+    old = f"; {_OF_0_1}" if reordered else ""
     return f"{call[1]}: {call[2]}{meant}; it takes {', '.join(known)}{old}"
 
 
@@ -235,7 +242,10 @@ def wrong_import(error: BaseException) -> str:
     who = Path(file).name if file and is_the_users(Path(file)) else error.name
     if (who, missing[1]) == ("mc_engine.lanes", "abs"):
         return 'mc_engine.lanes has no "abs"; physics takes that of Python, without an import'
-    return f'{who} has no "{missing[1]}"{hint(missing[1], getattr(module, "__all__", [*vars(module)]))}'
+    if who != error.name or (instead := _INSTEAD_OF_0_1.get(missing[1])) is None:
+        public = getattr(module, "__all__", [name for name in vars(module) if not name.startswith("_")])
+        return f'{who} has no "{missing[1]}"{hint(missing[1], public)}'
+    return f'{who} has no "{missing[1]}"; use {instead}; {_OF_0_1}'
 
 
 def _place_and_cause(error: Exception) -> tuple[str, str]:

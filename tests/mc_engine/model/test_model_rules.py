@@ -160,10 +160,27 @@ def test_a_model_in_the_form_of_version_0_1_is_pointed_to_the_change_log(tmp_pat
 
 
 @pytest.mark.parametrize(
-    "record", ['Parameter("mass_kg", "kg", "mass", 1.0, low=0.0)', 'Setting("law", "", "law", "a", choices=("a",))']
+    "record",
+    [
+        'Parameter("mass_kg", "kg", "mass", 1.0, low=0.0)',
+        'Parameter("mass_kg", "kg", "mass", 1.0, 0.0, 9.0)',
+        'Setting("law", "", "law", "a", choices=("a",))',
+    ],
 )
 def test_inputs_in_the_form_of_version_0_1_are_pointed_to_the_change_log(tmp_path, record):
     sentence = "CHANGELOG.md says under 0.2.0 how to convert a model of version 0.1"
     refused(
         tmp_path, [(IMPORTS, f"from mc_engine.model import Parameter, Setting\n\nOLD = {record}\n{IMPORTS}")], sentence
     )
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("attitude import body_matrix", "use to_matrix of mc_engine.physics.rotations"),
+        ("attitude import quaternion_product", "use product of mc_engine.physics.rotations"),
+        ("aerodynamics import over_mach", "use curve of mc_engine.physics.curves"),
+    ],
+)
+def test_a_function_of_version_0_1_names_what_replaces_it(tmp_path, old, new):
+    refused(tmp_path, [(IMPORTS, f"from mc_engine.physics.{old}\n{IMPORTS}")], f"; {new}; CHANGELOG.md says")
