@@ -164,17 +164,15 @@ def _far(model: Model, begun: Columns, coarse: Columns, fine: Columns) -> str:
 
     begun : the case after one step
     """
-    units = _units_at_end(model)
-    sizes = dict.fromkeys(units.values(), 0.0)
-    for name, unit in units.items():
-        sizes[unit] = max(sizes[unit], abs(begun[name][0]), abs(fine[name][0]))
-    far = (name for name, unit in units.items() if abs(coarse[name][0] - fine[name][0]) > _GROSS * sizes[unit])
-    return next(far, "")
+    sizes = _sizes_at_end(model, np.array([True]), begun, fine)
+    return next((name for name, size in sizes.items() if abs(coarse[name][0] - fine[name][0]) > _GROSS * size), "")
 
 
-def _units_at_end(model: Model) -> dict[str, str]:
-    """Unit of the end time and of each end state, by column; states of one unit, as of a position, have one size."""
-    return {END_TIME: END_TIME} | {f"end_{state.name}": state.unit for state in model.states}
+def _sizes_at_end(model: Model, which: np.ndarray, *flights: Columns) -> dict[str, float]:
+    """Largest size of the end time and of each end state, by column; those of one unit, as of a position, have one."""
+    units = {END_TIME: END_TIME} | {f"end_{state.name}": state.unit for state in model.states}
+    sizes = {name: max(abs(flown[name][which]).max(initial=0.0) for flown in flights) for name in units}
+    return {name: max(sizes[other] for other in units if units[other] == unit) for name, unit in units.items()}
 
 
 def _passed_over(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, flown: Columns) -> list[str]:
@@ -189,14 +187,11 @@ def _passed_over(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray,
     fine = results(campaign, inputs, ids, finer(model.clock, flight_s))
     elsewhere = flown["status"] != fine["status"]
     both = ~elsewhere & (flown["status"] == STATUS_NAME[OK])
-    units = _units_at_end(model)
-    sizes = {
-        unit: max(abs(flown[name][both]).max(initial=0.0) for name in units if units[name] == unit)
-        for unit in units.values()
-    }
-    for name, unit in units.items():
+    # also halfway: a state that the stopping event makes zero has no size at the end
+    halfway = results(campaign, inputs, ids, replace(model.clock, until=0.5 * flight_s))
+    for name, size in _sizes_at_end(model, both, flown, halfway).items():
         change = np.where(both, abs(fine[name] - flown[name]), 0.0)
-        elsewhere |= (change > flown[name][both].std()) & (change > _VISIBLE * sizes[unit])
+        elsewhere |= (change > flown[name][both].std()) & (change > _VISIBLE * size)
     if elsewhere.sum() < 2:
         return []
     return [f"steps are too long: {elsewhere.sum()} of the first {ids.size} cases end elsewhere with a tenth of the "

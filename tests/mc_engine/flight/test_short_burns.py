@@ -53,6 +53,11 @@ def cease(t, p):
 
 
 @physics
+def ground(s):
+    return s.x
+
+
+@physics
 def switch(s, m, hit):
     return s, Memory(on=where(hit.begin > 0.5, 1.0, where(hit.cease > 0.5, 0.0, m.on)))
 
@@ -157,3 +162,9 @@ def test_a_longest_step_may_be_a_setting_and_a_finer_clock_keeps_a_shorter_one()
 def test_a_longest_step_that_is_none_is_refused(tmp_path, longest):
     with pytest.raises(CampaignError, match="longest_step"):
         push(tmp_path / "push", *BY_TIME, clock=f"AdaptiveStep(until=2000.0, longest_step={longest})")
+
+
+def test_check_is_silent_where_the_stopping_event_makes_a_state_zero_but_for_rounding(tmp_path):
+    events = BY_EVENTS[1].replace("events={", 'events={"ground": Event(ground, "falling", "stop"), ')
+    fallen = push(tmp_path / "push", BY_EVENTS[0], events)
+    assert not [sentence for sentence in faults(fallen) if sentence.startswith("steps are too long")]
