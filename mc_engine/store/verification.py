@@ -204,7 +204,7 @@ def _obstacles(run: Path) -> Iterator[Damage]:
 
 
 def _present(run: Path) -> Iterator[str]:
-    """Names of all that is in the folders of parts, except what the next writer removes."""
+    """Names of all that is in the folders of parts, except what the next writer removes or nothing reads as cases."""
     if (run / NOMINAL).exists():
         yield NOMINAL
     for folder in PART_FOLDERS:
@@ -212,7 +212,9 @@ def _present(run: Path) -> Iterator[str]:
             yield folder
             continue
         for name in names_in(run, folder):
-            if not is_temporary(name) or (run / folder / name).is_dir():
+            # pandas, pyarrow and DuckDB pass over hidden files, such as .DS_Store; DuckDB reads hidden ones in .parquet
+            unread = is_temporary(name) or (name.startswith(".") and not name.endswith(".parquet"))
+            if not unread or (run / folder / name).is_dir():
                 yield f"{folder}/{name}"
 
 

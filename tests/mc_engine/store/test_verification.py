@@ -93,3 +93,11 @@ def test_a_run_whose_extension_is_lost_has_the_cases_that_it_flew(store):
     again = open_store(store.path)
     assert (again.n_cases, again.missing(), len(again.cases())) == (50, [], 50)
     assert damage(store.path) == []
+
+
+def test_a_hidden_file_among_the_parts_is_named_only_if_something_reads_it_as_cases(store):
+    everything(store)
+    (store.path / "cases" / ".DS_Store").write_bytes(b"Bud1")  # of macOS, in every folder that it showed
+    assert not [problem for problem in damage(store.path) if ".DS_Store" in problem]
+    (store.path / "cases" / "._part-0.parquet").write_bytes(b"\0\5\x16\7")  # of macOS, of each file on a foreign disk
+    assert any("cases/._part-0.parquet: is not of this run" in problem for problem in damage(store.path))
