@@ -144,8 +144,7 @@ def rare(
     if method not in METHODS:
         leave(USAGE, f'--method "{method}" is not known; {" or ".join(METHODS)}')
     campaign = load_campaign(file, seed=seed)
-    chosen_requirement(campaign, requirement)
-    refuse_unmappable(campaign)
+    refuse_unmappable(campaign, chosen_requirement(campaign, requirement))
     path = out if out is not None else default_folder(f"{campaign.name}-rare")
     refuse_occupied_folder(path)
     advise(lambda: after_search(path, "rare.json", "the estimate is"))

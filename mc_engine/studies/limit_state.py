@@ -29,6 +29,8 @@ from mc_engine.suggestions import hint, listed
 
 FIRST_NOISE = 2**51
 AT_LIMIT = float(np.nextafter(0.0, 1.0))  # margin of a case right at its limit: inside, as little as can be
+# columns of a rare event's cases beside those named by inputs and the metric, and those that every table has
+OWN_COLUMNS = ("level", "noise_id", "weight", "failed", "margin")
 
 
 class LimitState:
@@ -46,7 +48,7 @@ class LimitState:
         workers: int | None = None,
         watch: Callable[[int, int], None] | None = None,
     ):
-        refuse_unmappable(campaign)
+        refuse_unmappable(campaign, requirement)
         self.campaign, self.requirement = campaign, requirement
         self.metric_field = next(field for field in campaign.model.metrics if field.name == requirement.metric)
         self.names = [
@@ -113,8 +115,8 @@ def chosen_requirement(campaign: Campaign, name: str | None) -> Requirement:
     return next(requirement for requirement in campaign.requirements if name in (None, requirement.name))
 
 
-def refuse_unmappable(campaign: Campaign) -> None:
-    """Raise CampaignError for a campaign whose inputs are not continuous functions of standard normal numbers."""
+def refuse_unmappable(campaign: Campaign, requirement: Requirement) -> None:
+    """CampaignError unless inputs map continuously from standard normal numbers, and no name is one of OWN_COLUMNS."""
     problems = []
     if campaign.upstream is not None or campaign.first is not None:
         message = "takes inputs from another run, whose cases cannot be moved towards failure; give distributions"
@@ -134,5 +136,10 @@ def refuse_unmappable(campaign: Campaign) -> None:
             problems.append(Problem(f"dispersion.{dispersion.name}", message))
     if not problems and all(isinstance(dispersion.distribution, Constant) for dispersion in campaign.dispersions):
         problems.append(Problem("dispersion", "nothing is dispersed, so there is no probability to estimate"))
+    named = [(f"dispersion.{dispersion.name}", dispersion.name) for dispersion in campaign.dispersions]
+    for place, name in [*named, (f"requirement.{requirement.name}.metric", requirement.metric)]:
+        if name in OWN_COLUMNS:
+            message = f'"{name}" is the name of a column of every rare event; give it another name in the model'
+            problems.append(Problem(place, message))
     if problems:
         raise CampaignError(campaign.name, problems)

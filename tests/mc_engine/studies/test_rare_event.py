@@ -21,7 +21,7 @@ from mc_engine.sampling.correlation import normal_correlation
 from mc_engine.sampling.distributions import Discrete, Empirical, Normal
 from mc_engine.section import ReportSection
 from mc_engine.statistics.rare_events import Evaluated, RareEvent
-from mc_engine.studies.limit_state import LimitState, chosen_requirement
+from mc_engine.studies.limit_state import OWN_COLUMNS, LimitState, chosen_requirement
 from mc_engine.studies.rare_event import METHODS, _failed_inputs, estimate_rare_event
 from mc_engine.studies.rare_event_folder import open_rare_event, probability_words, rare_event_lines
 
@@ -191,6 +191,20 @@ def test_inputs_that_cannot_be_led_to_failure_are_refused_in_a_sentence():
         with pytest.raises(CampaignError, match=said) as refused:
             LimitState(campaign, campaign.requirements[0])
         assert len(refused.value.problems) == 1
+
+
+def test_inputs_and_a_metric_with_the_name_of_an_own_column_are_refused_before_a_flight(tmp_path, estimate):
+    inputs = {dispersion.name for dispersion in minimal().dispersions}
+    assert set(estimate.cases.columns) == {"case_id", "status", *OWN_COLUMNS, *inputs, "apogee_altitude_km"}
+    for name, text in (("sim.py", COUNTS), ("c.toml", COUNTED)):
+        for old, new in (('count"', 'margin"'), ("count=", "margin="), ("a_pct", "level"), ('or")', 'or", unit="")')):
+            text = text.replace(old, new)
+        (tmp_path / name).write_text(text)
+    told = command(tmp_path / "c.toml", "--out", tmp_path / "out")
+    assert told.exit_code == 2
+    assert 'dispersion.level: "level" is the name of a column of every rare event' in told.output
+    assert 'requirement.few.metric: "margin" is the name of a column of every rare event' in told.output
+    assert not (tmp_path / "out").exists()
 
 
 def command(*arguments):
