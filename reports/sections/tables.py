@@ -239,11 +239,11 @@ def _fixed_row(record: Mapping[str, Any]) -> tuple[Cell, ...]:
     value, unit = record.get("value", ""), record.get("unit", "")
     text = exact(value)
     if isinstance(value, float):
-        shown = chosen_unit(unit, [value])
-        converted = exact(float(f"{convert(value, unit, shown):.12g}")) if shown != unit else text
-        if len(converted) < len(text) and (abs(value) >= 1.0 or len(text) > SHORT_NUMBER):
-            text, unit = converted, shown
-        text = text if len(text) <= LONGEST_NUMBER else number(value, 8)
+        shown, told = chosen_unit(unit, [value]), value
+        converted = float(f"{convert(value, unit, shown):.12g}") if shown != unit else value
+        if len(exact(converted)) < len(text) and (abs(value) >= 1.0 or len(text) > SHORT_NUMBER):
+            text, unit, told = exact(converted), shown, converted
+        text = text if len(text) <= LONGEST_NUMBER else number(told, 8)
     sort = float(value) if isinstance(value, int | float) else None
     return Cell(str(record["name"])), Cell(with_unit(text, unit), sort), Cell(str(record.get("description", "")))
 

@@ -17,6 +17,7 @@ from reports.formats.markdown import render_markdown
 from reports.run.chosen_units import ShownRun, chosen_unit, spread_text
 from reports.run.flown import Flown
 from reports.sections.requirement_tables import requirement_table
+from reports.sections.tables import value_table
 from reports.text.numbers import number
 
 
@@ -40,6 +41,19 @@ from reports.text.numbers import number
 )
 def test_a_unit_is_changed_only_where_its_numbers_are_awkward(unit, numbers, told):
     assert chosen_unit(unit, numbers) == told
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "told"),
+    [
+        (12345.678901234567, "m", "12.3456789012 km"),
+        (-9.441339751580646e-07, "m", "−0.94413398 µm"),
+        (5.4, "km", "5.4 km"),
+    ],
+)
+def test_a_parameter_that_is_rounded_is_rounded_in_the_unit_that_it_is_told_in(value, unit, told):
+    table = value_table([{"name": "size_m", "unit": unit, "value": value, "description": "size"}], "Parameters")
+    assert table.rows[0][1].text.replace("\u202f", " ") == told
 
 
 @pytest.fixture(scope="module")
