@@ -98,6 +98,10 @@ class Upstream:
         """Name of the campaign that was flown."""
         return str(self.rows.facts["name"])
 
+    def name_here(self, column: str) -> str | None:
+        """The name of an upstream column in this campaign; None for what is no column that the rows keep."""
+        return column if self.links.get(column) == column else self.names.get(column)
+
     def nominal_row(self) -> dict[str, Any]:
         """The upstream columns of the nominal case: the nominal case upstream, and the linked inputs."""
         names = {self.names[column.name]: column.name for column in self.rows.columns if column.name in self.names}

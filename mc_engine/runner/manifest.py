@@ -89,23 +89,27 @@ def _upstream_facts(campaign: Campaign) -> dict[str, Any] | None:
 
 
 def _upstream_inputs(campaign: Campaign) -> list[dict[str, Any]]:
-    """The dispersions of the upstream run that are columns of this one, from its manifest."""
+    """The dispersions of the upstream run, from its manifest, under the names that they have here."""
     if campaign.upstream is None:
         return []
-    here = {column.name for column in campaign.upstream.columns}
-    name = campaign.upstream.name
-    records = [record for record in campaign.upstream.rows.facts["inputs"] if record["name"] in here]
-    return [{**record, "note": f"in the run of {name}. {record['note']}".strip()} for record in records]
+    upstream, name = campaign.upstream, campaign.upstream.name
+    records = [{**record, "name": upstream.name_here(record["name"])} for record in upstream.rows.facts["inputs"]]
+    return [
+        {**record, "note": f"in the run of {name}. {record['note']}".strip()} for record in records if record["name"]
+    ]
 
 
 def _upstream_figures(campaign: Campaign) -> list[dict[str, Any]]:
-    """Maps and scatter plots of the upstream run whose columns are also columns of this one."""
+    """Maps and scatter plots of the upstream run, with the names that its columns have here."""
     if campaign.upstream is None:
         return []
-    here = {column.name for column in columns_of(campaign)}
-    records = campaign.upstream.rows.facts["figures"]
-    drawn = [record for record in records if record["kind"] in ("map", "scatter")]
-    return [record for record in drawn if {record["x"], record["y"], record.get("metric", record["x"])} <= here]
+    figures = []
+    for record in campaign.upstream.rows.facts["figures"]:
+        axes = [key for key in ("x", "y", "metric") if key in record]
+        named = {key: campaign.upstream.name_here(record[key]) for key in axes}
+        if record["kind"] in ("map", "scatter") and all(named.values()):
+            figures.append({**record, **named})
+    return figures
 
 
 def _description(item: Named) -> dict[str, str]:
@@ -121,10 +125,11 @@ def _ranges(model: System) -> dict[str, list[float | None]]:
 
 def _constant_inputs(campaign: Campaign) -> dict[str, list[dict[str, Any]]]:
     """Parameters and settings that are the same in all cases."""
-    dispersed = {dispersion.name for dispersion in campaign.dispersions}
+    varying = {dispersion.name for dispersion in campaign.dispersions}
+    varying |= set() if campaign.upstream is None else campaign.upstream.links.keys()
     parameters, settings = [], []
     for name, item in inputs_of(campaign.model).items():
-        if name in dispersed:
+        if name in varying:
             continue
         record = {**_description(item), "value": campaign.nominal[name], "overridden": name in campaign.parameters}
         if isinstance(item, Setting):

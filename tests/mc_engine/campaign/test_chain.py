@@ -25,7 +25,9 @@ from tests.mc_engine.command_line.cart import call, fails_with
 MODEL = '''
 """A throw, straight up."""
 from mc_engine.lanes import physics
-from mc_engine.model import Event, FixedStep, Parameter, at_end, inputs, metrics, model, outputs, states
+from mc_engine.model import (
+    Event, FixedStep, Parameter, ScatterFigure, at_end, inputs, metrics, model, outputs, states,
+)
 
 Inputs = inputs(
     HEIGHT_km=Parameter(0.0, "first height"),
@@ -59,7 +61,7 @@ def observe(s):
 MODEL = model(
     name="throw", title="A throw", source="Galilei", inputs=Inputs, states=State, outputs=Outputs, metrics=Metrics,
     clock=FixedStep(0.01, 5.0), prepare=prepare, initial=initial, rhs=rhs, events={"top": Event(climb)},
-    observe=observe,
+    observe=observe, figures=(ScatterFigure("fall_s", "RESULT_m", "Over the time of the fall"),),
 )
 '''
 FIRST = """
@@ -151,6 +153,14 @@ def test_roles_and_nominal_case_follow_the_chain(folder):
     assert store.nominal()["top_m"] == nominal["top_m"]
     assert store.manifest["upstream"]["cases"] == 40
     assert store.manifest["upstream"]["links"] == {"height_km": "top_m"}
+
+
+def test_what_is_told_of_the_run_upstream_is_told_of_its_own_columns(folder):
+    manifest = open_store(folder / "runs" / "second").manifest
+    assert [record["name"] for record in manifest["inputs"]] == ["first_speed_m_s", "gravity_m_s2"]
+    axes = [(figure["x"], figure["y"]) for figure in manifest["figures"]]
+    assert axes == [("fall_s", "apex_m"), ("first_fall_s", "top_m")]  # each run has a column fall_s
+    assert [record["name"] for record in manifest["parameters"]] == ["speed_m_s"]  # height_km differs between the cases
 
 
 def test_a_case_that_failed_upstream_keeps_its_row_and_says_why(folder, cases):
