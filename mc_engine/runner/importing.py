@@ -48,7 +48,7 @@ def import_results(campaign: Campaign, file: Path, out: Path, history: Path | No
         raise CampaignError(file.name, problems[:_MOST])
     left_out = [name for name in table if name not in (*rows, *_NO_METRICS)]
     imported = {"file": file.name, "history": None if history is None else history.name, "left_out": left_out}
-    manifest = {**manifest_of(campaign), "imported": imported}
+    manifest = {**manifest_of(campaign), "histories_of_first": None, "imported": imported}  # why they exist is unknown
     columns = [column for column in columns_of(campaign) if column.name in rows]  # states of a model are not in tables
     store = create_store(out, manifest, campaign.text, columns, companions_of(campaign))
     with store.lock():

@@ -71,6 +71,7 @@ def manifest_of(campaign: Campaign) -> dict[str, Any]:
         "requirements": [asdict(requirement) for requirement in campaign.requirements],
         "report": campaign.report.model_dump(),
         "looks": list(campaign.looks),
+        "histories_of_first": _histories_of_first(campaign),
         "figures": [*(to_record(figure) for figure in model.figures), *_upstream_figures(campaign)],
         "published": [dict(record) for record in model.published],
         "upstream": _upstream_facts(campaign),
@@ -110,6 +111,14 @@ def _upstream_figures(campaign: Campaign) -> list[dict[str, Any]]:
         if record["kind"] in ("map", "scatter") and all(named.values()):
             figures.append({**record, **named})
     return figures
+
+
+def _histories_of_first(campaign: Campaign) -> int:
+    """How many cases, from case 0 on, keep their history whatever their result; one after them may be a worst case."""
+    listed, n = {*campaign.retention.cases}, campaign.retention.first
+    while n in listed:
+        n += 1
+    return n
 
 
 def _description(item: Named) -> dict[str, str]:

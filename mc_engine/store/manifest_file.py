@@ -199,6 +199,7 @@ class Head(Record):
     requirements: list[_Requirement] = []
     report: ReportSection = Field(default_factory=ReportSection)
     looks: list[CaseNumber] = []
+    histories_of_first: CaseNumber | None = None
     figures: list[_Figure] = []
     published: list[_Published] = []
     upstream: _Upstream | None = None

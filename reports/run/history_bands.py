@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import count
+from math import inf
 
 import numpy as np
 import pandas as pd
@@ -28,10 +29,13 @@ def envelope_probabilities(n_cases: int) -> tuple[float, ...]:
 def fair_cases(flown: Flown) -> list[int]:
     """Of the cases with a saved history those that stand for all: 0, 1, 2, ... up to the first gap; none of a design.
 
-    A case further on may have been kept because it is one of the worst; a band over such cases would be too wide.  A
+    A case further on may have been kept because it is one of the worst; a band over such cases would be too wide.  The
+    manifest says where they begin, as a worst case may also follow without a gap; it does not for imported results.  A
     failed case without a history, such as a refused one, is no gap.
     """
-    kept = sorted(case for case in flown.histories["case_id"].unique().tolist() if case >= 0 and flown.random)
+    first = flown.manifest.get("histories_of_first")
+    stop = inf if first is None else first
+    kept = sorted(case for case in flown.histories["case_id"].unique().tolist() if 0 <= case < stop and flown.random)
     if not kept:
         return []
     known = {*kept, *flown.every.failed(kept[-1] + 1)["case_id"].tolist()}

@@ -1,11 +1,16 @@
 """Percentile bands over the histories of many cases."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
 from figure_marks import drawings
 from synthetic_run import synthetic_run
 
+import campaigns
+import mc_engine
+from mc_engine.campaign.loading import load_campaign
 from reports.contents import build
 from reports.drawing import paper, screen
 from reports.drawing.marks import Band, Line
@@ -95,6 +100,16 @@ def test_only_cases_kept_for_no_reason_are_in_a_band():
         run = synthetic_run(100, failed=0)
         run.manifest["campaign"]["design"], run.history = "mc", pd.DataFrame({"case_id": np.repeat(saved, 3)})
         assert fair_cases(Flown(run, "run")) == fair
+
+
+def test_a_worst_case_that_follows_the_first_ones_without_a_gap_is_in_no_band(tmp_path):
+    """With `first = 30` the worst case is sometimes case 30: the envelope of "the first 31 cases" went as far as it."""
+    folder = Path(campaigns.__file__).parent / "minimal"
+    worst = '[retention.histories]\nfirst = 30\nworst = { metric = "top_speed_m_s", count = 60 }\n'
+    text = (folder / "campaign.toml").read_text().partition("[sensitivity]")[0] + worst
+    run = mc_engine.run(load_campaign("minimal", text=text, directory=folder, cases=60), tmp_path / "run", workers=1)
+    assert run.histories()["case_id"].max() == 59
+    assert fair_cases(Flown(run, "run")) == [*range(30)]
 
 
 def test_a_failed_case_without_a_history_is_no_gap_and_is_counted():
