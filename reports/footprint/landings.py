@@ -76,6 +76,9 @@ def landing_of(flown: Flown, figure: FootprintFigure) -> Landing | str:
     absent = flown.absence(figure.latitude, figure.longitude, *above_of)
     if absent:
         return f"{figure.title}: not drawn; {absent}."
+    planet = planet_of(flown, figure)
+    if not planet:
+        return f"{figure.title}: not drawn; the cases differ in the {flown.words(figure.planet)}."
     latitude, longitude = flown.values(figure.latitude), flown.values(figure.longitude)
     placed = _placed(flown, figure)
     rows = np.flatnonzero(placed & _down(flown, figure))
@@ -83,8 +86,7 @@ def landing_of(flown: Flown, figure: FootprintFigure) -> Landing | str:
     if not rows.size:
         high = f"; {count(above)} ended above {height_limit(flown, figure)}" if above else ""
         return f"{figure.title}: not drawn; none of {count(flown.n_held)} cases has an impact point{high}."
-    ellipsoid = ELLIPSOIDS.get(planet_of(flown, figure), WGS84)
-    measured = footprint(latitude[rows], longitude[rows], ellipsoid, flown.random)
+    measured = footprint(latitude[rows], longitude[rows], ELLIPSOIDS.get(planet, WGS84), flown.random)
     if measured is None:
         return f"{figure.title}: not drawn; the {count(rows.size)} impact points lie too far apart for one figure."
     if measured.reach < 1.0 and rows.size > 1:
@@ -141,6 +143,10 @@ def height_limit(flown: Flown, figure: FootprintFigure) -> str:
 
 
 def planet_of(flown: Flown, figure: FootprintFigure) -> str:
+    """The planet on which the cases land, in small letters; empty if they land on several."""
+    if figure.planet in flown.cases.columns:
+        planets = {str(planet).lower() for planet in flown.cases[figure.planet]}
+        return planets.pop() if len(planets) == 1 else ""
     settings = {record["name"]: record.get("value") for record in flown.manifest.get("settings", [])}
     return str(settings.get(figure.planet, "earth")).lower()
 

@@ -110,11 +110,12 @@ def _line(run: int, x: np.ndarray, y: np.ndarray, what: str) -> Line:
 
 
 def _footprint(runs: tuple[Flown, Flown], figure: FootprintFigure) -> Plot | None:
-    """Impact points in the plane about the mean impact point of run A."""
+    """Impact points in the plane about the mean impact point of run A; None for runs on different planets."""
     places = [landed(run, figure) for run in runs]
-    if min(latitude.size for latitude, _ in places) == 0:
+    planet, other = (planet_of(run, figure) for run in runs)
+    if min(latitude.size for latitude, _ in places) == 0 or not planet or planet != other:
         return None
-    plane = middle_plane(*places[0], ELLIPSOIDS.get(planet_of(runs[1], figure), WGS84))
+    plane = middle_plane(*places[0], ELLIPSOIDS.get(planet, WGS84))
     if plane is None:
         return None
     marks = []

@@ -140,6 +140,18 @@ def test_another_planet_has_its_own_size_and_no_files_for_a_globe():
     assert axes[0] / axes[1] == pytest.approx(3396.19 / 6378.0, rel=5e-3)
 
 
+def test_landings_on_several_planets_are_in_no_footprint_and_those_on_one_are_measured_on_it():
+    """A grid over Mars and the Earth had one mean impact point, and the coasts and the size of the Earth."""
+    figures = [FOOTPRINT | {"planet": "law"}]
+    document = build(landing_run(laws=("mars", "earth"), figures=figures), "run")
+    assert "Where the flights end: not drawn; the cases differ in the law." in sentences(document)
+    assert document.files == ()
+    run = landing_run(figures=figures)
+    run.table["law"] = "mars"
+    axes = [float(blocks(build(one, "run"), Table)[0].rows[0][4].text.split()[0]) for one in (run, landing_run())]
+    assert axes[0] / axes[1] == pytest.approx(3396.19 / 6378.0, rel=5e-3)
+
+
 def test_chosen_cases_have_points_and_no_regions():
     run = landing_run()
     run.manifest["campaign"]["design"] = "grid"
