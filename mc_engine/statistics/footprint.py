@@ -31,12 +31,16 @@ class Footprint:
 
 
 def footprint(
-    latitude: np.ndarray, longitude: np.ndarray, ellipsoid: tuple[float, float] = WGS84, random: bool = True
+    latitude: np.ndarray,
+    longitude: np.ndarray,
+    ellipsoid: tuple[float, float] = WGS84,
+    random: bool = True,
+    confidence: float = 0.90,
 ) -> Footprint | None:
     """The footprint of impact points float64[n], finite, geodetic degrees.
 
-    random : the cases are a random sample, so that regions are meaningful.  None without a point, and for points too
-    far apart for a plane.
+    random : the cases are a random sample, so that regions are meaningful.  confidence : of the content of the regions.
+    None without a point, and for points too far apart for a plane.
     """
     plane = middle_plane(latitude, longitude, ellipsoid)
     if plane is None:
@@ -46,5 +50,5 @@ def footprint(
     if reach > FARTHEST:
         return None
     ellipses = covariance_ellipses(points, thinnest=NARROWEST) if random else ()
-    regions = density_regions(points, thinnest=NARROWEST) if random else ()
+    regions = density_regions(points, confidence=confidence, thinnest=NARROWEST) if random else ()
     return Footprint(plane, points, reach, ellipses, regions)

@@ -86,7 +86,8 @@ def landing_of(flown: Flown, figure: FootprintFigure) -> Landing | str:
     if not rows.size:
         high = f"; {count(above)} ended above {height_limit(flown, figure)}" if above else ""
         return f"{figure.title}: not drawn; none of {count(flown.n_held)} cases has an impact point{high}."
-    measured = footprint(latitude[rows], longitude[rows], ELLIPSOIDS.get(planet, WGS84), flown.random)
+    ellipsoid, confidence = ELLIPSOIDS.get(planet, WGS84), flown.stated.confidence
+    measured = footprint(latitude[rows], longitude[rows], ellipsoid, flown.random, confidence)
     if measured is None:
         return f"{figure.title}: not drawn; the {count(rows.size)} impact points lie too far apart for one figure."
     if measured.reach < 1.0 and rows.size > 1:

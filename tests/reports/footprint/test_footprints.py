@@ -140,6 +140,18 @@ def test_another_planet_has_its_own_size_and_no_files_for_a_globe():
     assert axes[0] / axes[1] == pytest.approx(3396.19 / 6378.0, rel=5e-3)
 
 
+def test_the_regions_have_the_confidence_of_the_report():
+    """With `confidence = 0.99` under [report] they kept 90 %, and were too small for it."""
+    inside = {}
+    for confidence in (0.8, 0.99):
+        document = build(landing_run(report={"probability": 0.9973, "confidence": confidence}), "run")
+        rows = [row for row in blocks(document, Table)[0].rows if "distribution-free" in row[0].text]
+        assert rows
+        assert all(f"{100.0 * confidence:.0f}\u202f% confidence" in row[0].small for row in rows)
+        inside[confidence] = rows[0][2].value
+    assert inside[0.8] < inside[0.99]
+
+
 def test_landings_on_several_planets_are_in_no_footprint_and_those_on_one_are_measured_on_it():
     """A grid over Mars and the Earth had one mean impact point, and the coasts and the size of the Earth."""
     figures = [FOOTPRINT | {"planet": "law"}]
