@@ -80,7 +80,7 @@ class FootprintFigure:
     longitude : str, column [deg]
     title : str
     ends_below : tuple (column, value) or None; a case whose column is above the value has not landed
-    planet : str, the setting that names the planet; empty for the Earth
+    planet : str, the setting that names the planet; empty for the Earth; no footprint for cases that differ in it
     target : tuple of two columns or parameters, latitude and longitude of the target; without it distances are
         measured from the end of the nominal case
 
