@@ -62,9 +62,10 @@ class HeldCases:
 
     def values(self, name: str) -> np.ndarray:
         """float64[n_held] of a column; NaN for words, for a missing column, and for metrics of failed cases."""
-        if name not in self.table.columns:
+        # Words may look like numbers, such as the choices "1" and "off" of a setting.
+        if name not in self.table.columns or not pd.api.types.is_numeric_dtype(self.table[name]):
             return np.full(len(self.table), np.nan)
-        values = pd.to_numeric(self.table[name], errors="coerce").to_numpy(dtype=np.float64)
+        values = self.table[name].to_numpy(dtype=np.float64)
         return values if self._roles.get(name) == "dispersion" else np.where(self.ok, values, np.nan)
 
     # ---- all cases

@@ -115,8 +115,8 @@ class Flown:
             ColumnFacts(record["name"], record.get("unit", ""), record.get("role", ""), record.get("description", ""))
             for record in records
         ]
-        known = {"t_s": ColumnFacts("t_s", "s", "time", "time")}
-        for fact in facts:
+        known: dict[str, ColumnFacts] = {}
+        for fact in (*facts, ColumnFacts("t_s", "s", "time", "time")):  # a metric may have the name of the time
             known.setdefault(fact.name, fact)
         return known
 
