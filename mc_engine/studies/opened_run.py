@@ -247,7 +247,8 @@ class Case:
         Returns a DataFrame with a row for the start, the end of each step, each event, and both sides of each call of
         `control` and `switch`. Its columns:
 
-        t_s, states and outputs : in declared units, under their own names; `attrs["units"]` says which
+        t_s, states and outputs : in declared units, under their own names; `attrs["units"]` says which.  A state with
+            the name of an output, or of t_s, is s.NAME
         m.NAME : the discrete state, in SI, as all columns below
         d(NAME)/dt : the derivative of a state, from `rhs`
         event.NAME : the functions of the events

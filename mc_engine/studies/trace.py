@@ -38,10 +38,18 @@ def trace_case(
     before = rows.shift()
     repeats = (rows.eq(before) | (rows.isna() & before.isna())).all(axis=1)  # a sample or an event that changes nothing
     trace = rows[~repeats].reset_index(drop=True)
-    units = {"t_s": "s", **{field.name: field.unit for field in (*model.states, *model.quantities)}}
+    names = _state_columns(model)
+    units = {names[field.name]: field.unit for field in model.states}
+    units |= {"t_s": "s", **{field.name: field.unit for field in model.quantities}}
     trace.attrs["units"] = {name: units.get(name, "") for name in trace.columns}
     end = {f"end_{field.name}": row[0] / field.si_factor for field, row in zip(model.states, states, strict=True)}
     return trace, {"end_time_s": float(time[0]), **end}
+
+
+def _state_columns(model: Model) -> dict[str, str]:
+    """The column of each state: its name, or s.NAME where an output, or the time, has that name, too."""
+    taken = {"t_s", *(output.name for output in model.quantities)}
+    return {state.name: f"s.{state.name}" if state.name in taken else state.name for state in model.states}
 
 
 class _TracedFlight(InterpretedFlight):
@@ -71,7 +79,8 @@ class _TracedFlight(InterpretedFlight):
             events = functions.events(*arguments) if model.events is not None else ()
             functions.observe(*arguments)
         columns: dict[str, Any] = {"t_s": float(t)}
-        columns |= {field.name: value / field.si_factor for field, value in zip(model.states, s, strict=True)}
+        names = _state_columns(model)
+        columns |= {names[field.name]: v / field.si_factor for field, v in zip(model.states, s, strict=True)}
         columns |= {field.name: value / field.si_factor for field, value in zip(model.quantities, fields, strict=False)}
         if model.phases:  # whose number is the last of the fields
             columns[PHASE_COLUMN] = model.phases[int(fields[-1])]

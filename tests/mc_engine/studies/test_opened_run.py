@@ -116,6 +116,23 @@ def test_a_trace_names_functions_inside_functions_and_fields_of_records(tmp_path
     assert (trace[["m.aim.x", "m.aim.y"]] == [3.0, 4.0]).all(axis=None)
 
 
+def test_a_trace_has_a_state_and_the_output_of_its_name_apart(tmp_path):
+    text = (SHIPPED / "minimal" / "model.py").read_text()
+    for old, new in (
+        ("Outputs = outputs(", 'Outputs = outputs(x_m="x from the launch site", '),
+        ("return Outputs(", "return Outputs(x=s.x - 1000.0, "),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "model.py").write_text(text)
+    model = load_model("model.py", tmp_path)
+    trace, end = trace_case(model, inputs_of(model, {}), 0, 1, 60.0)
+    assert trace["s.x_m"].iloc[-1] == end["end_x_m"]
+    assert (trace["x_m"] == trace["s.x_m"] - 1000.0).all()
+    assert [trace.attrs["units"][name] for name in ("x_m", "s.x_m", "y_m")] == ["m", "m", "m"]
+    assert "s.y_m" not in trace
+
+
 def test_a_trace_that_is_not_the_case_of_the_run_or_has_no_physics_is_refused(run, tmp_path):
     case = run.case(17)
     with pytest.raises(StoreError, match=r"case 17 ended with end_x_m = 1\.0, its trace with"):
