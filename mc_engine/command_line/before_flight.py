@@ -84,10 +84,8 @@ def check(
     )
     if alike := seed_remark(campaign.seed, campaign.upstream.rows.facts if campaign.upstream else None):
         typer.echo(f"seed {alike}")
-    if model:
-        with copies_of(campaign) as copies:
-            for line in flyer.remarks(copies):
-                typer.echo(line)
+    for line in flyer.remarks(copies_of) if model else []:
+        typer.echo(line)
 
 
 @contextmanager

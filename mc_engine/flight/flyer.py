@@ -6,6 +6,7 @@ reasons, and time histories of some cases.  The runner, the store and all studie
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 from subprocess import Popen
 from typing import Any
@@ -21,6 +22,8 @@ NOMINAL_NOISE = 2**52  # the nominal draws its noise where no case does
 Columns = dict[str, np.ndarray]
 Inputs = Mapping[str, Any]
 Process = Popen[str]
+# a folder of the copies that a run keeps of the model's files, for a block; None if the model is no file
+Copies = Callable[[Any], AbstractContextManager[Path | None]]  # of a Campaign
 _STATUS_WORDS = np.array([STATUS_NAME[code] for code in range(len(STATUS_NAME))], dtype=object)
 
 
@@ -106,11 +109,8 @@ class Flyer(ABC):
         process : one of `mc_engine.flight.contract_flight`, which has loaded the campaign and waits to fly.
         """
 
-    def remarks(self, copies: Path | None) -> list[str]:
-        """Lines for `check` on a simulator that is sound: is it deterministic, how long does a case take.
-
-        copies : folder of those that a run keeps of the model's files, None if the model is no file.
-        """
+    def remarks(self, copies_of: Copies) -> list[str]:
+        """Lines for `check` on a simulator that is sound: is it deterministic, how long does a case take."""
         return []
 
     @abstractmethod

@@ -4,6 +4,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import ModelError
 from mc_engine.flight.case_process import CaseEnded, CaseProcess, give_back, take
 from mc_engine.flight.case_worker import Order, Setup, folder_name, settle
-from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, Inputs, Process, RunStopped, never, other_bits
+from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Copies, Flyer, Inputs, Process, RunStopped, never, other_bits
 from mc_engine.flight.program_flight import Flown, flown
 from mc_engine.model.fields import Setting, inputs_of
 from mc_engine.model.record import Refusals
@@ -125,7 +126,7 @@ class SimulatorFlyer(Flyer):
         columns = self.fly(full_inputs(self._campaign, table), noise)
         return [{name: column[k] for name, column in columns.items()} for k in range(len(noise))]
 
-    def remarks(self, copies: Path | None) -> list[str]:
+    def remarks(self, copies_of: Copies) -> list[str]:
         """Deterministic or not, metrics that no input moves, seconds a case, hours for the campaign here.
 
         The nominal and one dispersed case are flown in two processes, which differ in what was flown before; in the
@@ -142,10 +143,9 @@ class SimulatorFlyer(Flyer):
         first, dispersed = self._flown(nominal, {})[0], self._flown(ids, table)[0]
         seconds = (time.perf_counter() - begin) / 2
         self.process().end()  # before another starts, which may need its licence
-        again = self
-        if copies is not None and not self.simulator.is_described:
-            again = SimulatorFlyer(replace(self._campaign, directory=copies))
-        dispersed_again, first_again = again._flown(ids, table)[0], again._flown(nominal, {})[0]
+        with nullcontext() if self.simulator.is_described else copies_of(self._campaign) as copies:
+            again = self if copies is None else SimulatorFlyer(replace(self._campaign, directory=copies))
+            dispersed_again, first_again = again._flown(ids, table)[0], again._flown(nominal, {})[0]
         if again is not self and first["status"] == STATUS_NAME[OK] != first_again["status"]:
             why = str(first_again["reason"]).replace(f"{copies}{os.sep}", "")
             return [f"from the copies of its files that a run keeps, as `replay` and `extend` fly it, the nominal case "

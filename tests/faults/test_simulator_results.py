@@ -9,6 +9,7 @@ import pytest
 from mc_engine import load_campaign, replay, run
 from mc_engine.flight import program_flight
 from mc_engine.flight.flyers import flyer_of
+from mc_engine.runner.flown_campaign import copies_of
 from tests.mc_engine.flight.falling_ball import python_campaign
 
 RESULTS = {
@@ -177,7 +178,7 @@ def test_check_says_where_a_batch_has_other_results_than_its_cases_alone(tmp_pat
     file = python_campaign(tmp_path / "batch", cases=40, options="batch=True,")
     source = file.parent / "sim.py"
     source.write_text(source.read_text().replace('"fall_time_s": time,', f'"fall_time_s": {numbers},'))
-    remarks = "\n".join(flyer_of(load_campaign(file)).remarks(None))
+    remarks = "\n".join(flyer_of(load_campaign(file)).remarks(copies_of))
     assert said in remarks
     assert ("batch" in remarks) == bool(said)
 
@@ -191,7 +192,7 @@ OF_A_PROCESS = {
 @pytest.mark.parametrize(("imports", "fault"), OF_A_PROCESS.values(), ids=OF_A_PROCESS)
 def test_check_says_where_results_depend_on_the_process_of_a_case(tmp_path, imports, fault):
     file = python_campaign(tmp_path / "ball", cases=4, fault=fault, imports=imports, options="slots=1,")
-    remarks = flyer_of(load_campaign(file)).remarks(None)
+    remarks = flyer_of(load_campaign(file)).remarks(copies_of)
     assert remarks[0].startswith("not deterministic: fall_time_s, impact_speed_m_s differ between two flights")
 
 
