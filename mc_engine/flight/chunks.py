@@ -30,8 +30,9 @@ Guard = Callable[[np.ndarray], AbstractContextManager[Any]]
 
 
 def chunk_size(cases: int, workers: int, flyer: Flyer | type[Flyer] = Flyer) -> int:
-    """How many cases a worker flies at a time, and a part holds, by default."""
-    return min(max(-(-cases // (flyer.chunks_per_worker * workers)), flyer.smallest_chunk), flyer.largest_chunk)
+    """How many cases a worker flies at a time, and a part holds, by default: as many chunks for each worker."""
+    each = max(flyer.chunks_per_worker, -(-cases // (workers * flyer.largest_chunk)))
+    return max(-(-cases // (each * workers)), flyer.smallest_chunk)
 
 
 def chunks_of(ranges: Iterable[tuple[int, int]], size: int) -> Iterator[tuple[int, int]]:

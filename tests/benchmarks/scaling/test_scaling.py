@@ -53,14 +53,14 @@ def test_shards_fly_ten_times_as_fast_on_ten_times_the_nodes_and_merging_takes_a
     assert merging(COSTS, 1e9, 10) == pytest.approx(merging(COSTS, 1e9, 100), rel=0.02)
     assert merging(COSTS, 1e9, 10)["merging"] == pytest.approx(1e4)
     assert merging(COSTS, 1e9, 10)["fetching"] == pytest.approx(
-        ((10 * 3052 * 2 + 1e9 * 0.2e-3) * 0.030 / 8 + 1e9 * 2e-6) / 8
+        ((10 * 3060 * 2 + 1e9 * 0.2e-3) * 0.030 / 8 + 1e9 * 2e-6) / 8
     )
 
 
 def test_publishing_takes_what_its_requests_bytes_and_processor_take():
     published = as_shards(replace(COSTS, request_ms=0.0), 1e9, 10)["publishing"]
     assert published == pytest.approx(1e8 * (4e-6 + 1e-6 + 3e-6 + 3 * 200e-9))
-    assert as_shards(COSTS, 1e9, 10)["publishing"] - published == pytest.approx((3052 * 7 + 1e8 * 0.5e-3) * 0.030 / 8)
+    assert as_shards(COSTS, 1e9, 10)["publishing"] - published == pytest.approx((3060 * 7 + 1e8 * 0.5e-3) * 0.030 / 8)
 
 
 def test_each_size_of_part_that_was_measured_gives_its_own_requests_back():

@@ -1,5 +1,8 @@
 """Missing cases are divided into the parts that an unbroken run has, or that a lost part had."""
 
+import pytest
+
+from mc_engine.flight.chunks import LARGEST_CHUNK, chunk_size
 from mc_engine.runner.part_bounds import Stretch, part_bounds, stretches
 from mc_engine.store.journal import Entry
 
@@ -32,3 +35,14 @@ def test_a_withdrawn_part_is_flown_within_its_bounds_and_of_two_that_overlap_the
     lines = entries(BEGUN, withdrawn(10, 19), withdrawn(12, 17), withdrawn(28, 33))
     along = stretches(lines, 30, 30)
     assert part_bounds([(0, 30)], lines, along, 3) == [(0, 10), (10, 12), (12, 18), (18, 28), (28, 30)]
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3, 16])
+@pytest.mark.parametrize("cases", [64, 10_000, 600_000, 1_000_000, 10**8])
+def test_every_worker_has_as_many_parts(cases, workers):
+    """No worker waits in the end for another one that flies one part more, as long as parts are not tiny."""
+    size = chunk_size(cases, workers)
+    assert size <= LARGEST_CHUNK
+    parts = -(-cases // size)
+    assert parts % workers == 0 or size < 100  # else rounding up may cost a part
+    assert parts >= min(8 * workers - 1, cases // 64)
