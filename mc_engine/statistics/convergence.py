@@ -14,7 +14,7 @@ intervals are those of independent draws, which is conservative.
 """
 
 from dataclasses import dataclass
-from math import erfc, sqrt
+from math import erfc, inf, sqrt
 
 import numpy as np
 from scipy.special import stdtrit
@@ -91,7 +91,8 @@ def running_mean(values: np.ndarray, confidence: float = 0.90) -> RunningEstimat
     half = stdtrit(used - 1.0, 0.5 * (1.0 + confidence)) * deviation / np.sqrt(used)
     first, second = np.array_split(off, 2)
     error = sqrt(first.var(ddof=1) / first.size + second.var(ddof=1) / second.size)
-    apart = abs(float(first.mean() - second.mean())) / error
+    # Two constant halves differ: else all cases were equal.
+    apart = abs(float(first.mean() - second.mean())) / error if error > 0.0 else inf
     return RunningEstimate(
         None,
         cases,

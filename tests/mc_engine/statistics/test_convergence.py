@@ -75,6 +75,14 @@ def test_independent_cases_are_said_to_drift_no_more_often_than_stated(estimate)
     assert np.mean(alarms) < 0.01 + 0.015
 
 
+def test_halves_that_are_constant_and_differ_have_not_settled():
+    """A switch that turns after half of the cases: no scatter in either half, and no chance that they are alike."""
+    values = np.repeat([0.0, 1.0], 5000)
+    for estimate in (running_mean(values), running_quantile(values, 0.5)):
+        assert estimate.halves_p < 1e-12
+        assert not estimate.settled
+
+
 @pytest.mark.parametrize("law", [stats.cauchy(), stats.pareto(1.5), stats.lognorm(2.0)])
 def test_a_mean_that_a_few_extreme_cases_dominate_has_not_settled(law):
     draw = np.random.Generator(np.random.Philox(key=5))
