@@ -60,7 +60,10 @@ def single_change_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
         yield _table(flown, told)
     same = [metric for metric, rows in found.items() if metric not in told and any(row.known.any() for row in rows)]
     if same:
-        yield f"No input alone changes {flown.listed(same)}, in the cases that have it."
+        yield (
+            f"No input alone changes {flown.listed(same)} by more than rounding, {number(ROUNDING)} of the largest "
+            "metric in the same unit, in the cases that have it."
+        )
     unknown = [metric for metric in found if metric not in (*told, *same)]
     if unknown:
         yield (
