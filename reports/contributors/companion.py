@@ -15,7 +15,7 @@ from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.run.chosen_units import spread_text
 from reports.run.contributions import MOST_METRICS, UNEXPLAINED, Contributions, Contributor, surely
 from reports.run.flown import Flown
-from reports.text.numbers import count, counted, fixed, given_percent, number
+from reports.text.numbers import count, counted, fixed, given_percent, number, used_of
 
 _TRENDS = {"src": "SRC", "prcc": "PRCC", "spearman": "Spearman"}
 
@@ -44,9 +44,7 @@ def no_contributors(flown: Flown, silent: list[str], used: str = "cases") -> Ite
 
 
 def _effect_figure(flown: Flown, contributions: Contributions, shown: list[str]) -> FigureBlock:
-    used = [contributions.n_used[metric] for metric in shown]
-    few, most = min(used), max(used)
-    of = f"{count(few)}{f' to {count(most)}' * (few != most)} of {count(contributions.n_tried)}"
+    of = used_of([contributions.n_used[metric] for metric in shown], contributions.n_tried)
     of_blocks = f"{of} blocks of cases flown for this purpose"
     fitted = any(row.total is not None for metric in shown for row in contributions.by_metric[metric])
     of_cases = f"from a surrogate model of {of} cases" if fitted else f"from {of} cases"

@@ -11,7 +11,7 @@ from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.run.contributions import Contributor
 from reports.run.flown import Flown
 from reports.run.outcomes import ALL_LIMITS, inside, inside_words
-from reports.text.numbers import axis_label, count, counted, given_percent, number
+from reports.text.numbers import axis_label, count, counted, given_percent, number, used_of
 
 MOST_METRICS = 8
 MOST_INPUTS = 12  # of a metric in the table
@@ -63,7 +63,7 @@ def further_metrics(flown: Flown) -> Iterator[str]:
 
 def _index_figure(flown: Flown, indices: DesignedIndices, shown: np.ndarray, names: Mapping[str, str]) -> FigureBlock:
     by_metric = [(names[indices.metrics[k]], _contributors(indices, int(k))) for k in shown]
-    source = f"from {count(int(indices.n_used[shown].min()))} of {count(indices.n_tried)} blocks of the design"
+    source = f"from {used_of(indices.n_used[shown].tolist(), indices.n_tried)} blocks of the design"
     return contributor_figure(flown, by_metric, source)
 
 

@@ -32,6 +32,12 @@ def counted(number: int, noun: str) -> str:
     return f"{count(number)} {noun}{'' if number == 1 else 's'}"
 
 
+def used_of(used: Sequence[int], tried: int) -> str:
+    """How many of those tried the metrics of a figure use: 724 to 1 000 of 1 000, or one number for all of them."""
+    few, most = min(used), max(used)
+    return f"{count(few)}{f' to {count(most)}' * (few != most)} of {count(tried)}"
+
+
 def first_of(shown: int, known: int, noun: str) -> str:
     """What a figure or a table shows of several: key metrics, or first 8 of 15 key metrics."""
     return noun if shown >= known else f"first {count(shown)} of {count(known)} {noun}"

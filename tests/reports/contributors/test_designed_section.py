@@ -51,6 +51,14 @@ def test_an_input_that_is_also_in_the_histories_keeps_its_place_in_the_blocks():
     assert Flown(both, "run").contributions.by_metric["propellant_kg"] == expected
 
 
+def test_the_caption_says_of_how_many_blocks_the_metrics_with_fewest_and_most_numbers_are():
+    """It named the fewest alone, as if every metric had lost the blocks in which one of them has no number."""
+    run = designed("saltelli")
+    run.table.loc[:79, "propellant_kg"] = np.nan
+    (figure,) = [block for block in section(run) if isinstance(block, FigureBlock)]
+    assert figure.caption.endswith("from 130 to 150 of 150 blocks of the design.")
+
+
 def test_too_few_blocks_are_a_sentence():
     blocks = section(designed("saltelli", 16))
     assert not [block for block in blocks if isinstance(block, Table)]
