@@ -43,8 +43,9 @@ def margin_block(flown: Flown) -> FigureBlock | None:
     return FigureBlock(
         "Margins of the requirements, relative to the size of the limit, or to half the distance between two limits: "
         "midway between them is 100 %. Margins beyond 100 % are drawn at the edge."
-        + f" Not drawn, the limit is 0: {', '.join(left_out)}."
-        * bool(left_out),
+        + " The worst case is one with a number; cases without one are outside, and not drawn."
+        * any(verdict.no_number for verdict in flown.own.verdicts)
+        + f" Not drawn, the limit is 0: {', '.join(left_out)}." * bool(left_out),
         margin_figure(names, np.array(margins, dtype=np.float64), tones),
     )
 

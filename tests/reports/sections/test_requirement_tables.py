@@ -144,6 +144,14 @@ def test_printed_bounds_and_margins_claim_no_more_than_the_cases_show(seed, limi
     assert words.replace("\u202f", " ") == f"fuel, {share:g} %"
 
 
+@pytest.mark.parametrize("failed", [0, 100])
+def test_a_figure_of_margins_says_that_cases_without_a_number_are_outside_and_not_drawn(failed):
+    """A worst case far inside its limit was drawn for a requirement that a tenth of the cases missed by failing."""
+    built = flown(1000, failed, campaign=mc())
+    assert (built.verdicts[0].no_number > 0) == (failed > 0)
+    assert ("cases without one are outside, and not drawn" in margin_block(built).caption) == (failed > 0)
+
+
 @pytest.mark.parametrize("lowest", [None, -1.0])
 def test_a_key_result_is_what_the_matrix_says_is_demonstrated(lowest):
     band = flown(2000, campaign=mc(2000), requirements=[{**FUEL, "at_least": lowest}])
