@@ -148,7 +148,9 @@ def _distribution_text(campaign: Campaign, dispersion: Dispersion, unit: str) ->
 
 
 def _bounds_text(dispersion: Dispersion, unit: str) -> str:
-    """Such as "-10 to 10 %", or empty where the file sets no bounds."""
+    """Such as "-10 to 10 %", or empty where the file sets no bounds, or levels, whose ends are named."""
+    if dispersion.levels:
+        return ""
     lower, upper = (_in_unit(dispersion, dispersion.spec.get(key), unit) for key in ("lower", "upper"))
     if lower is not None and upper is not None:
         return _with_unit(f"{number(lower)} to {number(upper)}", unit)

@@ -263,8 +263,11 @@ def input_table(flown: Flown) -> Table | None:
         name, unit = str(record["name"]), str(record.get("unit", ""))
         ends = flown.every.ends(name)
         spread = 0.5 * (ends[1] - ends[0]) if ends and ends[1] > ends[0] else None
-        drawn = " to ".join(number(end, 4, spread) for end in ends) if ends else "–"
         nominal = record.get("nominal", "")
+        if isinstance(nominal, bool):
+            drawn = ", ".join(dict.fromkeys(exact(bool(end)) for end in ends or ())) or "–"
+        else:
+            drawn = " to ".join(number(end, 4, spread) for end in ends) if ends else "–"
         rows.append(
             (
                 Cell(axis_label(name, unit), small=str(record.get("description", ""))),

@@ -216,6 +216,17 @@ def test_the_table_of_inputs_has_bounds_powers_and_ends_that_differ():
     assert float(low) == pytest.approx(54.98999, abs=1e-7)
 
 
+@pytest.mark.parametrize(("switches", "told"), [([True, False, True], "no, yes"), ([False, False, False], "no")])
+def test_the_drawn_values_of_a_switch_have_the_words_of_its_nominal_value(switches, told):
+    run = synthetic_run(300, failed=0)
+    run.table["backup"] = np.resize(switches, 300)
+    fact = {"name": "backup", "unit": "", "description": "a switch"}
+    run.manifest["columns"].append({**fact, "role": "dispersion"})
+    run.manifest["inputs"].append({**fact, "nominal": True, "distribution": "discrete", "source": ""})
+    row = input_table(Flown(run, "run")).rows[-1]
+    assert (row[1].text, row[3].text) == ("yes", told)
+
+
 def test_the_spread_of_an_event_has_a_unit_of_its_own():
     """A transfer of days with σ of seconds: 55 s, not 6.4·10⁻⁴ days."""
     run = synthetic_run(400, failed=0)
