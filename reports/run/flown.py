@@ -363,20 +363,18 @@ class Flown:
     def contributors(self, metric: str) -> list[Contributor]:
         """The dispersed inputs that vary, the one that contributes most to the metric first."""
         if metric not in self._contributors:
-            self._contributors[metric] = self._flown_contributors(metric) or contributors(
+            self._contributors[metric] = self._by_total_effect(metric) or contributors(
                 self.inputs, self.values(metric), self.design == "sobol"
             )
         return self._contributors[metric]
 
-    def _flown_contributors(self, metric: str) -> list[Contributor]:
-        """The same from the flights beside the run, by total effect; empty without them."""
-        contributions = self.contributions
-        if contributions is None or not contributions.flights:
+    def _by_total_effect(self, metric: str) -> list[Contributor]:
+        """The same as the chapter on contributors ranks them: some act only together; empty where it has none."""
+        if self.contributions is None:
             return []
-        rows, inputs = contributions.by_metric.get(metric, ()), self.inputs
-        return [
-            Contributor(name, row.size) for row in rows for name in contributions.members[row.input] if name in inputs
-        ]
+        rows, members, inputs = self.contributions.by_metric.get(metric, ()), self.contributions.members, self.inputs
+        named = [(name, row.size) for row in rows for name in members.get(row.input, [row.input])]
+        return [Contributor(name, size) for name, size in named if name in inputs]
 
     @cached_property
     def contributions(self) -> Contributions | None:

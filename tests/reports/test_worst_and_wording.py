@@ -163,6 +163,25 @@ def test_a_map_of_two_inputs_that_explain_little_is_a_sentence_that_names_those_
     assert explained_share(wind.to_numpy(), mass.to_numpy(), run.table["entry_speed_m_s"].to_numpy()) > 0.95
 
 
+def test_two_inputs_that_act_only_together_are_found_to_explain_most():
+    """Neither has a first-order effect: by that alone, two idle inputs were said to explain most, namely 0 %."""
+    run = synthetic_run(1500, failed=0)
+    rng = np.random.default_rng(2)
+    names = [f"idle_{word}" for word in ("one", "two", "three", "four", "five", "six")] + ["wind_factor", "mass_factor"]
+    for name in names:
+        run.table[name] = rng.normal(size=1500)
+        run.manifest["columns"].append({"name": name, "unit": "", "role": "dispersion", "description": name})
+    run.table["propellant_kg"] = run.table["wind_factor"] * run.table["mass_factor"]
+    run.manifest["figures"] = [to_record(MapFigure("propellant_kg", "ve_pct", "oe_pct", "Idle"))]
+    blocks = build(run, "run").sections
+    said = " ".join(text for one in blocks for block in one.blocks for text in getattr(block, "paragraphs", ()))
+    (pair,) = re.findall(r"the two inputs that explain most are (\w+) factor and (\w+) factor, 100\u202f%", said)
+    assert set(pair) == {"wind", "mass"}
+    (worst,) = [block for one in blocks for block in one.blocks
+                if getattr(block, "caption", "") == "Cases with the largest propellant"]  # fmt: skip
+    assert {column.title for column in worst.columns[3:5]} == {"wind factor", "mass factor"}
+
+
 def test_contributors_come_by_the_variance_that_they_explain():
     rng = np.random.default_rng(1)
     inputs = {name: rng.normal(size=5000) for name in ("a", "b", "c")} | {"same": np.ones(5000)}
