@@ -185,13 +185,11 @@ def _change_cards(comparison: Comparison) -> Iterator[Card]:
             "Other requirements" if len(same) < len(comparison.verdicts) else "Requirements", "same verdicts", detail
         )
     total = len(comparison.metrics)
-    for label, moved, what in (("Shift", comparison.shifted, "mean"), ("Spread", comparison.spread, "spread")):
+    for label, moved in (("Shift", comparison.shifted), ("Spread", comparison.spread)):
         ranked = sorted(moved, key=lambda change: -change.effect)
         names = ", ".join(words(change.metric, comparison.units[change.metric]) for change in ranked[:4])
         more = f" and {len(moved) - 4} more" if len(moved) > 4 else ""
-        detail = (
-            f"of {count(total)} metrics: {names}{more}" if moved else f"the {what} of none of {count(total)} metrics"
-        )
+        detail = f"of {count(total)} metrics: {names}{more}" if moved else f"none of {count(total)} metrics"
         yield _change_card(label, len(moved), detail)
     shares = comparison.moved_shares
     detail = ", ".join(share.name for share in shares) or f"none of {count(len(comparison.shares))} fractions of cases"

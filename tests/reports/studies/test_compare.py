@@ -218,6 +218,18 @@ def test_a_comparison_names_its_runs_without_the_path_of_a_disk(names, shown):
     assert "/data" not in repr(document)
 
 
+def test_a_mean_that_a_few_extreme_cases_move_is_not_said_to_be_the_same():
+    """The test of the shift is one of ranks: the page said that no mean had changed."""
+    run, other = synthetic_run(400, failed=0), synthetic_run(400, failed=0, seed=2)
+    other.table.loc[:1, "peak_force_n"] += 1e5
+    found = compare_runs(run, other, ("before", "after"))
+    change = next(one for one in found.metrics if one.metric == "peak_force_n")
+    assert change.mean[1] - change.mean[0] > 10.0 * change.deviation[0]
+    assert not found.shifted
+    told = {card.label: (card.answer, card.detail) for card in build_comparison(found).verdicts}
+    assert told["Shift"] == ("none significant", f"none of {len(found.metrics)} metrics")
+
+
 def test_the_mean_of_each_run_has_the_digits_of_its_own_spread():
     found = compared(shift=9000.0)
     change = next(one for one in found.metrics if one.metric == "peak_force_n")
