@@ -26,7 +26,7 @@ from mc_engine.statistics.input_columns import InputColumn, average_ranks, equal
 from mc_engine.statistics.picked_cases import picked_rows
 
 FALSE_DISCOVERIES = 0.05  # at most this share of what is reported, on average
-ONE_END = 1.96  # standard deviations between the two halves of an input: 5 % by chance
+ONE_END = 1.96  # standard deviations of a half of an input, or between the two halves: 5 % by chance
 FEWEST = 5  # failed, and passed, cases for a single driver
 FEWEST_FOR_PAIRS = 10
 FEWEST_OF_SOBOL = 20  # for a single driver, where the cases are Sobol' points
@@ -196,11 +196,13 @@ def _rank_test(requirement: str, column: InputColumn, failed: np.ndarray) -> Dri
 
 
 def _ends(values: np.ndarray, ranks: np.ndarray, failed: np.ndarray) -> str:
-    """At which ends of the values cases fail: at one, where the two halves of the cases differ beyond chance."""
+    """At which ends of the values cases fail: at both, where each half of the cases shows its own beyond chance, or
+    where the halves differ no more than by chance."""
     upper = ranks > 0.5 * (ranks.size + 1)
     rise, fall = (_normal_score(average_ranks(values[half]), failed[half]) for half in (upper, ~upper))
     apart = (rise + fall) / np.sqrt(2.0)  # failures of the lower half lie at its low end
-    return "at both ends" if abs(apart) < ONE_END else f"at the {'high' if apart > 0.0 else 'low'} end"
+    both = min(rise, -fall) > ONE_END or abs(apart) < ONE_END
+    return "at both ends" if both else f"at the {'high' if apart > 0.0 else 'low'} end"
 
 
 def _normal_score(ranks: np.ndarray, failed: np.ndarray) -> float:

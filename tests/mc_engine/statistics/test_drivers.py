@@ -129,6 +129,14 @@ def test_of_very_many_cases_all_failed_ones_are_tested_and_an_even_choice_of_the
     assert _tested_rows(failed[:, :MOST_ROWS], usable[:MOST_ROWS]).size == MOST_ROWS - 1
 
 
+def test_failures_at_both_ends_are_so_named_where_one_end_has_more_of_them():
+    """An eighth of the cases fail above, a fifteenth below: they were said to fail at the high end."""
+    for key in range(20):
+        z = np.random.Generator(np.random.Philox(key=key)).normal(size=250)
+        (driver,) = failure_drivers({"a": z}, {"limit": (z > 1.15) | (z < -1.5)}).singles
+        assert driver.where == ("at both ends",)
+
+
 def test_sobol_points_need_more_failed_cases_and_are_not_tested_for_pairs():
     """The 14 points of 500 at the high end of the first input lie in one half of others, which have no effect."""
     names = [f"x{k}" for k in range(10)]
