@@ -28,7 +28,8 @@ class DesignedIndices:
 
     Saltelli: "first_order" and "total", fractions of the metric's variance.  Morris: "mu_star", "mu" and "sigma", mean
     size, mean and standard deviation of the metric's change in a step of half the levels, divided by the step as a
-    fraction of the range between the outer levels (2/3).
+    fraction of the range between the outer levels (2/3); no "mu" and "sigma" of an input with more than two words,
+    whose steps have no direction.
     n_used : int64[n_metrics], complete blocks with numbers, of n_tried.
     """
 
@@ -56,7 +57,8 @@ def designed_indices(
     values = {name: np.full(shape, np.nan) for name in names}
     reach = {name: np.full(shape, np.nan) for name in names}
     n_used = np.zeros(len(metrics), dtype=np.int64)
-    coded = np.column_stack([column.values for column in input_columns(inputs)])[rows]
+    columns = input_columns(inputs)
+    coded = np.column_stack([column.values for column in columns])[rows]
     for k, column in enumerate(metrics.values()):
         y = np.asarray(column, dtype=np.float64)[rows]
         flown = np.isfinite(y).all(axis=1)
@@ -70,6 +72,8 @@ def designed_indices(
             indices = _morris(tuple(inputs), coded[flown], y, confidence)
         for name, (value, half) in indices.items():
             values[name][:, k], reach[name][:, k] = value, half
+    for name in {"mu", "sigma"}.intersection(names):
+        values[name][[not column.ordered for column in columns]] = np.nan
     return DesignedIndices(design, tuple(inputs), tuple(metrics), values, reach, n_used, len(rows))
 
 

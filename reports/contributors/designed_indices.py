@@ -107,7 +107,9 @@ def _index_table(
 
 
 def _cell(value: float, reach: float, least: float) -> Cell:
-    """An index and half its interval; what is below `least` is the rounding of a zero."""
+    """An index and half its interval; what is below `least` is the rounding of a zero.  A dash for NaN."""
+    if not np.isfinite(value):
+        return Cell("–")
     value, reach = (0.0 if abs(index) < least else float(index) for index in (value, reach))
     return Cell(number(value, 3), value, f"± {number(reach, 2)}" if np.isfinite(reach) else "")
 
@@ -127,6 +129,7 @@ def _morris_note(confidence: str) -> str:
         f"± half the {confidence} interval (bootstrap; analysis by SALib). An effect is the metric’s change "
         "as one input steps between the middles of quarters of its distribution that lie two apart, divided by 2/3. "
         "μ*: mean size; μ: mean; σ: standard deviation, large where the effect bends or depends on other inputs. It "
-        "ranks inputs; Sobol’ indices need the design saltelli. A trajectory with a case that has no number is left "
-        "out whole. Random draws in flight enlarge every μ* and σ."
+        "ranks inputs; Sobol’ indices need the design saltelli. Steps between more than two words have no direction, "
+        "and so no μ and σ. A trajectory with a case that has no number is left out whole. Random draws in flight "
+        "enlarge every μ* and σ."
     )

@@ -41,6 +41,21 @@ def test_morriss_trajectories_give_the_effects_of_a_line_and_a_product():
     assert sigma[1] == pytest.approx(4.0 * np.sqrt(5.0 / 64.0) * 0.75, rel=0.06)
 
 
+def test_effects_of_words_have_a_size_and_no_direction():
+    """Their sign and their scatter were those of the alphabet: other names of the same levels gave others."""
+    cases, x, _ = flown("morris", 50, lambda a, b, c: a)
+    level = np.digitize(x["x1"], [1 / 3, 2 / 3])
+    y = 3.0 * x["x0"] + np.array([0.0, 1.0, -2.0])[level]
+    words = [np.array(names)[level] for names in (["fast", "slow", "coast"], ["slow", "coast", "fast"])]
+    found = [designed_indices("morris", cases, {**x, "x1": word}, {"y": y}).values for word in words]
+    np.testing.assert_array_equal(found[0]["mu_star"], found[1]["mu_star"])
+    for name in ("mu", "sigma"):
+        np.testing.assert_array_equal(np.isnan(found[0][name][:, 0]), [False, True, False])
+        np.testing.assert_array_equal(found[0][name], found[1][name])
+    switch = designed_indices("morris", cases, {**x, "x1": x["x1"] > 0.5}, {"y": y}).values
+    assert np.isfinite(switch["mu"]).all()
+
+
 @pytest.mark.parametrize("design", ["saltelli", "morris"])
 def test_a_block_with_a_failed_case_is_left_out_whole_and_counted(design):
     cases, x, y = flown(design, 200, ishigami)
