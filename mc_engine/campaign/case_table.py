@@ -17,7 +17,7 @@ from mc_engine.model.fields import Parameter, Setting, inputs_of
 from mc_engine.model.files import FileFault, resolve_beside
 from mc_engine.model.simulator import System
 from mc_engine.suggestions import hint
-from mc_engine.units import convert
+from mc_engine.units import compatible, convert
 
 _CASE_ID = "case_id"  # `mc-engine sample` writes it; here it may only count the rows
 
@@ -97,6 +97,8 @@ def _checked_values(path: Path, item: Parameter | Setting, cells: np.ndarray, un
         return _dates(path, item, cells)
     values = numbers(path, item.name, cells)
     if unit is not None:
+        if unit not in compatible(item.unit):
+            return values  # noted with the dispersion; without a unit they have no range
         values = convert(values, unit, item.unit)
     wrong = np.flatnonzero(~((values >= item.low) & (values <= item.high)))
     if wrong.size:

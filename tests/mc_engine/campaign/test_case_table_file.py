@@ -92,6 +92,8 @@ def test_a_table_where_none_belongs_or_none_is_there_is_refused(folder):
         ("table", HEAD, "[dispersion.mass_kg]", "dispersion.mass_kg", "the table has no such column"),
         ("table", HEAD, "[dispersion.height_km]\nhalf_range = 2", "dispersion.height_km.half_range", "the design"),
         ("table", HEAD, '[dispersion.height_km]\nunit = "kg"', "dispersion.height_km.unit", '"kg" is not a unit'),
+        ("table", HEAD, '[dispersion.height_km]\nunit = "Meter"', "dispersion.height_km.unit", '"Meter" is not a unit'),
+        ("table", HEAD, '[dispersion.speed_pct]\nunit = "deg"', "dispersion.speed_pct.unit", '"deg" is not a unit'),
     ]:
         found = problems(body, design, head=head, directory=folder)
         assert list(found) == [place]
