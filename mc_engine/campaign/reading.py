@@ -337,7 +337,11 @@ def _message(section: type[Section] | None, details: ErrorDetails) -> str:
     if kind == "missing" and section is not None:
         return f"is missing: {_keys(_class_at(section, location))[str(location[-1])].description}"
     if kind == "extra_forbidden" and section is not None:
-        return f"is not a known key{hint(str(location[-1]), _keys(_class_at(section, location)))}"
+        key = str(location[-1])
+        owners = [dist for dist, other in DISTRIBUTIONS.items() if key in other.model_fields]
+        if section is LevelsDispersion and owners:
+            return f"is a key of {listed(owners)}; dist is missing"
+        return f"is not a known key{hint(key, _keys(_class_at(section, location)))}"
     if kind == "literal_error" and location[-1:] == ("design",) and value == "halton":
         return '"halton" is no longer offered; use "sobol"'
     if kind == "literal_error":

@@ -100,6 +100,8 @@ MISTAKES = [
     ('dist = "discrete"\nvalues = []', "values", "0 given; at least 1 needed"),
     ('dist = "constant"\nvalue = true', "value", "true is not a number; height_km is Height [km]"),
     ('dist = "normal"\nsigma = 1\nlevels = 5', "levels", NO_LEVELS),
+    ("sigma = 1", "sigma", 'is a key of "normal", "lognormal"; dist is missing'),
+    ("value = 4", "value", 'is a key of "constant"; dist is missing'),
 ]  # fmt: skip
 # of other inputs: name, what stands there, key, message
 MISTAKES_OF_OTHERS = [
