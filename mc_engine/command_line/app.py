@@ -278,6 +278,8 @@ def refuse_unwritable_file(option: str, path: Path) -> None:
         leave(USAGE, f"{option} {path}: there is no folder {path.parent}")
     if path.is_dir():
         leave(USAGE, f"{option} {path}: is a folder; name a file")
+    if os.path.lexists(path) and (path.is_symlink() or not path.is_file()):  # /dev/null would become a file for all
+        leave(USAGE, f"{option} {path}: is a link, a device or a pipe, and would be replaced; name a file")
     if not os.access(path.parent, os.W_OK):
         leave(USAGE, f"{option} {path}: this user may not write to the folder {path.parent}; name a file elsewhere")
     file = path.resolve()

@@ -103,6 +103,17 @@ def test_what_cannot_be_asked_of_sound_folders_and_urls_is_wrong_usage_and_no_da
     assert not (here / "whole").exists()
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such pipes")
+def test_a_pipe_a_device_or_a_link_is_not_replaced_by_an_output_file(here):
+    small_store(here / "a")
+    os.mkfifo(here / "pipe")
+    (here / "stdout").symlink_to("/proc/self/fd/1")
+    for name in ("pipe", "stdout"):
+        fails_with(2, call("export", "a", "--out", name), f"--out {name}: is a link, a device or a pipe, and would be")
+    assert (here / "pipe").is_fifo()
+    assert (here / "stdout").is_symlink()
+
+
 def test_a_file_beside_a_manifest_of_something_else_is_written_again(here):
     small_store(here / "a")
     (here / "manifest.json").write_text("{}")  # of a project of another kind
@@ -118,10 +129,8 @@ def test_a_sample_is_not_written_over_a_table_that_the_campaign_reads(here):
     table = here / "cart" / "pushes.csv"
     table.write_text("push_n\n1.0\n2.0\n2.5\n")
     (here / "link.csv").symlink_to(table)
-    for name in ("cart/pushes.csv", "link.csv"):
-        fails_with(
-            2, call("sample", "cart", "--out", name), f"--out {name}: the campaign reads this file; name another"
-        )
+    for name, said in [("cart/pushes.csv", "the campaign reads this file; name another"), ("link.csv", "is a link, ")]:
+        fails_with(2, call("sample", "cart", "--out", name), f"--out {name}: {said}")
     assert table.read_text() == "push_n\n1.0\n2.0\n2.5\n"
     assert call("sample", "cart", "--out", "cart/a.csv").exit_code == 0
 
