@@ -57,8 +57,8 @@ def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray
 
 def _checked_ids(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
     refuse_no_campaign(campaign)
-    given = np.asarray(case_ids).reshape(-1)
-    if given.size and given.dtype.kind not in "iu":
+    given = np.atleast_1d(case_ids)
+    if given.ndim > 1 or (given.size and given.dtype.kind not in "iu"):
         message = f"a case is a whole number from 0 to {campaign.cases - 1}, and {given.tolist()[0]!r} is none"
         raise CampaignError(campaign.name, [Problem("", message)])
     ids = given.astype(np.int64)
