@@ -103,6 +103,8 @@ def _is_explained(argument, text):
         (lambda e, run: e.case_table(e.load_campaign("minimal"), [0.5]), "a whole number from 0 to 1999, and 0.5 is"),
         (lambda e, run: e.replay(run, 3.5), "a whole number from 0 to 7, and 3.5 is none"),
         (lambda e, run: e.replay(run, [3]), r"a whole number from 0 to 7, and \[3\] is none"),
+        (lambda e, run: e.Simulator("title", ("mass_kg",), ()), r"`parameters` is \('mass_kg',\); declare it, param"),
+        (lambda e, run: e.Simulator("t", (e.Parameter(1.0, "mass"),), ()), "declare it, parameters=inputs"),
         (lambda e, run: e.run(e.load_campaign("minimal"), shard="1/2"), r"'1/2' is no Shard; Shard.parse\(\"1/2\"\)"),
         (lambda e, run: e.run(e.load_campaign("minimal"), backend=None), "backend: None is not allowed; it is a Back"),
         (lambda e, run: e.run(e.load_campaign("minimal"), workers=True), "workers: True is not allowed; it must be"),

@@ -192,7 +192,8 @@ def _declared(name: str, what: str, made: Any) -> Any:
     for metric in getattr(made, "computed", ()):
         raise ModelError(f'the metric "{metric}" is computed along the flight of a model; a simulator gives all of its '
                          f'metrics itself, {metric}="meaning"')  # fmt: skip
-    if not isinstance(made, tuple) and not hasattr(made, "declared"):
+    named = isinstance(made, tuple) and all(getattr(item, "name", "") for item in made)
+    if not named and not hasattr(made, "declared"):
         raise ModelError(f"`{name}` is {made!r}; declare it, {name}={what}(...)")
     return getattr(made, "declared", made)
 
