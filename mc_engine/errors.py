@@ -35,13 +35,13 @@ class EngineError(Exception):
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake: its location in the campaign file (dotted keys), and what to do about it."""
+    """One mistake: its location in the campaign file (dotted keys), and what to do about it; its text is one line."""
 
     place: str
     message: str
 
     def __str__(self) -> str:
-        text = f"{self.place}: {self.message}" if self.place else self.message
+        text = (f"{self.place}: {self.message}" if self.place else self.message).replace("\n", "\\n")
         return text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]} ... {text[-_LONGEST // 2 :]}"
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mc_engine.campaign.reading import Findings, parse_toml, read_sections
-from mc_engine.errors import CampaignError
+from mc_engine.errors import CampaignError, Problem
 
 CAMPAIGN = '[campaign]\nmodel = "m.py"\ndesign = "mc"\ncases = 5\nseed = 0\n'
 
@@ -94,6 +94,13 @@ def test_broken_toml_is_reported_with_line_and_column():
         with pytest.raises(CampaignError, match="this is not TOML") as caught:
             parse_toml(text, "x.toml")
         assert caught.value.problems[0].place == place
+
+
+def test_a_word_with_a_line_break_is_told_in_one_line():
+    """As of a string in three quotes whose end stands on the next line."""
+    _, messages = read(CAMPAIGN + '[dispersion.a]\ndist = """normal\n"""\n')
+    (place,) = messages
+    assert str(Problem(place, messages[place])) == r'dispersion.a.dist: "normal\n" is not known; did you mean "normal"?'
 
 
 def test_usual_mistakes_in_toml_are_told_with_their_fix():
