@@ -50,7 +50,8 @@ def events_that_never_happen(
     times = _nominal_times(campaign, watched) if nominal["status"][0] == STATUS_NAME[OK] else {}
     if all(_happens(event, times) for event in asked):
         return
-    cases = {name: np.append(campaign.nominal[name], np.broadcast_to(row, ids.size)) for name, row in inputs.items()}
+    # the inputs of a chain also hold columns of the run upstream, which the nominal case lacks
+    cases = {name: np.append(one, np.broadcast_to(inputs[name], ids.size)) for name, one in campaign.nominal.items()}
     noise = np.append(NOMINAL_NOISE, ids)
     flown = fly(watched, cases, noise, campaign.seed, folder=campaign.directory)
     ok = flown["status"] == STATUS_NAME[OK]

@@ -215,6 +215,15 @@ def test_a_campaign_that_is_not_flown_yet_is_flown_first_beside_the_run(folder, 
             run(asked, tmp_path / "both")
 
 
+def test_check_names_an_event_that_happens_in_no_case_of_a_chain(folder, tmp_path):
+    model = (folder / "second" / "model.py").read_text()
+    model = model.replace("\nMODEL", "\n@physics\ndef depth(s):\n    return s.height + 1.0\n\nMODEL")
+    (tmp_path / "model.py").write_text(model.replace("Event(climb)", 'Event(climb), "cellar": Event(depth)'))
+    text = (folder / "second" / "campaign.toml").read_text().replace("../runs", str(folder / "runs"))
+    (tmp_path / "campaign.toml").write_text(text)
+    fails_with(2, call("check", tmp_path), "1 problem", 'the event "cellar" crosses zero in none of 26 cases')
+
+
 def test_numbers_from_outside_hold_also_where_the_first_campaign_is_yet_to_be_flown(folder, tmp_path):
     text = (folder / "second" / "campaign.toml").read_text().replace("../runs/first", "../first/campaign.toml")
     text = text.replace("seed = 2", "seed = 2\ncases = 40")
