@@ -10,7 +10,7 @@ import numpy as np
 from mc_engine.campaign.loading import Campaign
 from mc_engine.flight import flight
 from mc_engine.flight.contract import breaches, flight_faults, refuse_breaches
-from mc_engine.flight.flyer import Columns, Flyer, Inputs, Process, never
+from mc_engine.flight.flyer import Columns, Copies, Flyer, Inputs, Process, never
 from mc_engine.flight.kernel import FINER_STEPS, finer, make_kernel_folder, source_digest, usual_width
 from mc_engine.flight.lost_numbers import first_lost, may_be_lost
 from mc_engine.model.fields import AdaptiveStep
@@ -65,6 +65,15 @@ class CompiledFlyer(Flyer):
     def faults_in_flight(self, process: Process) -> list[str]:
         make_kernel_folder()  # or what is wrong with the folder would be told as a fault of the model
         return flight_faults(self._campaign, process)
+
+    def remarks(self, copies_of: Copies) -> list[str]:
+        """That no case was flown, where the inputs come from a campaign that is flown first."""
+        if (first := self._campaign.first) is None:
+            return []
+        return [
+            f'no case was flown to check the model, as its inputs come from "{first.name}", which has yet to be flown; '
+            "to check the model, fly that campaign and give the directory of its run as `from` in [inputs]"
+        ]
 
     def refuse_faults(self) -> None:
         refuse_breaches(self._campaign)

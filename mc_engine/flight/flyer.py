@@ -110,7 +110,7 @@ class Flyer(ABC):
         """
 
     def remarks(self, copies_of: Copies) -> list[str]:
-        """Lines for `check` on a simulator that is sound: is it deterministic, how long does a case take."""
+        """Lines for `check` without faults: what it left out; is a simulator deterministic, how long is a case."""
         return []
 
     @abstractmethod

@@ -224,6 +224,18 @@ def test_check_names_an_event_that_happens_in_no_case_of_a_chain(folder, tmp_pat
     fails_with(2, call("check", tmp_path), "1 problem", 'the event "cellar" crosses zero in none of 26 cases')
 
 
+def test_check_says_that_no_case_flew_where_the_first_campaign_is_yet_to_be_flown(folder, tmp_path):
+    text = (folder / "second" / "campaign.toml").read_text().replace("../runs", str(folder / "runs"))
+    shutil.copy(folder / "second" / "model.py", tmp_path)
+    (tmp_path / "campaign.toml").write_text(text)
+    assert "no case was flown" not in call("check", tmp_path).stdout
+    (tmp_path / "campaign.toml").write_text(text.replace(f"{folder}/runs/first", f"{folder}/first/campaign.toml"))
+    checked = call("check", tmp_path)
+    assert (checked.exit_code, checked.stdout.count("\n")) == (0, 2)
+    assert 'no case was flown to check the model, as its inputs come from "first", which has' in checked.stdout
+    assert "no case was flown" not in call("check", tmp_path, "--no-model").stdout
+
+
 def test_numbers_from_outside_hold_also_where_the_first_campaign_is_yet_to_be_flown(folder, tmp_path):
     text = (folder / "second" / "campaign.toml").read_text().replace("../runs/first", "../first/campaign.toml")
     text = text.replace("seed = 2", "seed = 2\ncases = 40")
