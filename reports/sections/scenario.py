@@ -44,7 +44,7 @@ def _vehicle(flown: Flown) -> str:
     model, upstream = flown.manifest.get("model", {}), flown.manifest.get("upstream")
     said = [f"{model['title']}." if model.get("title") else ""]
     said.append(f"Source of the model: {model['source'].rstrip('.')}." if model.get("source") else "")
-    dispersed = counted(len(flown.with_role("dispersion")), "dispersed input")
+    dispersed = counted(len(flown.manifest.get("inputs", [])), "dispersed input")
     nominal = ", and one nominal case with all inputs at their nominal values"
     if flown.nominal.get("reason") == NO_NOMINAL:
         nominal = ""

@@ -163,6 +163,15 @@ def test_what_is_told_of_the_run_upstream_is_told_of_its_own_columns(folder):
     assert [record["name"] for record in manifest["parameters"]] == ["speed_m_s"]  # height_km differs between the cases
 
 
+def test_the_report_counts_the_dispersed_inputs_that_it_lists(folder, tmp_path):
+    shutil.copytree(folder / "runs" / "second", tmp_path / "run")
+    assert call("report", tmp_path / "run", "--format", "md").exit_code == 0
+    report = (tmp_path / "run" / "report.md").read_text()
+    assert "(independent random draws) with 2 dispersed inputs, and one nominal case" in report
+    table = report.partition("Dispersed inputs\n\n")[2].partition("\n\n")[0]
+    assert len(table.splitlines()) == 2 + 2  # head and rule, then the inputs
+
+
 def test_a_case_that_failed_upstream_keeps_its_row_and_says_why(folder, cases):
     first, second = cases
     failed = first["status"] != "ok"
