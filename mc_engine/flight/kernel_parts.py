@@ -129,17 +129,18 @@ def _picks(model: Model, makers: Any) -> list[Any]:
     names = [quantity.name for quantity in model.quantities]
     peaks = [e for e in model.extrema if e.kind in ("max", "min")]
     lasts = [e for e in model.extrema if e.kind == "last_above"]
-    # a model without peaks or last times tracks its first output instead, so that no tuple of a loop is empty
-    peak_picks = [(names.index(e.quantity), _sign(e), 0.0) for e in peaks] or [(0, 1.0, 0.0)]
-    last_picks = [(names.index(e.quantity), 1.0, e.level) for e in lasts] or [(0, 1.0, 0.0)]
+    adaptive = isinstance(model.clock, AdaptiveStep)
+    # on a grid a model without peaks or last times tracks its first output instead, so that no tuple of a loop is empty
+    instead = [] if adaptive else [(0, 1.0, 0.0)]
+    peak_picks = [(names.index(e.quantity), _sign(e), 0.0) for e in peaks] or instead
+    last_picks = [(names.index(e.quantity), 1.0, e.level) for e in lasts] or instead
     n_events = max(1, len(model.event_list))
-    first_peak = n_events if isinstance(model.clock, AdaptiveStep) else 0
+    first_peak = n_events if adaptive else 0
     best_picks, best_class = _tracked(model.extrema, peaks, lasts, first_peak, first_peak + len(peak_picks))
     smooth = [1.0 if e.smooth else 0.0 for e in peaks] or [0.0]
-    extremum_kinds = [PEAK if is_smooth else CORNER for is_smooth in smooth] + ([LAST] * len(lasts) or [CORNER])
-    kinds = [EVENT] * n_events + extremum_kinds
+    kinds = [EVENT] * n_events + [PEAK if e.smooth else CORNER for e in peaks] + [LAST] * len(lasts)
     signs = [DIRECTIONS[e.direction] for e in model.event_list] or [-1.0]
-    if isinstance(model.clock, AdaptiveStep):  # its events, peaks and last times are tracked as one
+    if adaptive:  # its events, peaks and last times are tracked as one
         signs += [-1.0] * (len(kinds) - n_events)
     actions = [event.action for event in model.event_list]
     return [
@@ -201,7 +202,7 @@ def _tracked(
     place |= {e.name: first_last + i for i, e in enumerate(lasts)}
     names = [e.name for e in extrema]
     best_class = namedtuple("Best", names or ["unused"])  # type: ignore[misc]
-    return [(place[e.name], _sign(e), 0.0) for e in extrema] or [(first_peak, 1.0, 0.0)], best_class
+    return [(place[e.name], _sign(e), 0.0) for e in extrema] or [(0, 1.0, 0.0)], best_class
 
 
 # ---- to check that each event can occur: their times are kept in the discrete state, behind that of the model
