@@ -92,9 +92,9 @@ def _root(kind, before, after, rate_before, rate_after, direction, low, high):
 
 @physics
 def _near(kind, root, before, after, rate, direction, high, width):
-    """Not negative where the side that has crossed is near the zero, and its sense is as small as its rate says."""
-    small = (kind == PEAK) | (abs(after) < 2.0 * width * abs(rate))
-    return where(crossed(before, after, direction), where(small, root + width - high, -1.0), 1.0)
+    """Not negative where the side that has crossed is within four widths of the zero; its sense and rate say so too."""
+    small = (kind == PEAK) | (abs(after) < 8.0 * width * abs(rate))
+    return where(crossed(before, after, direction), where(small, root + 4.0 * width - high, -1.0), 1.0)
 
 
 @physics

@@ -217,3 +217,40 @@ def test_the_time_of_a_largest_value_that_jumps_there_is_that_of_the_jump():
     columns = flown(load_model("opened_parachute.py", FOLDER), open_s=opening)
     assert columns["top_s"] == pytest.approx(opening, abs=1e-9)
     assert (columns["top_m_s2"] > 500.0).all()
+
+
+class CountedFlight(InterpretedFlight):
+    """Keeps the times at which the derivative was asked for."""
+
+    def __init__(self, model):
+        super().__init__(model)
+        self.times = []
+
+    def call(self, name, function, arguments):
+        if name == "rhs":
+            self.times.append(float(arguments[0]))
+        return super().call(name, function, arguments)
+
+
+def counted(model, **inputs):
+    """(times of all derivatives, end time) of one case."""
+    flight = CountedFlight(model)
+    (end,), *_ = fly_interpreted(flight, inputs_of(model, inputs), 0, 1)
+    return np.array(flight.times), end
+
+
+def test_an_orbit_takes_the_steps_of_one_of_the_same_shape_a_hundred_times_as_large(orbit):
+    """By Kepler's third law a thousand times as slow; a first step that depends on the unit of time is not similar."""
+    low = counted(orbit, radius_m=7e6, speed_m_s=8000.0, duration_s=3000.0)[0]
+    high = replace(orbit, clock=replace(orbit.clock, atol=(1e-3, 1e-3, 1e-9, 1e-9)))
+    times = counted(high, radius_m=7e8, speed_m_s=800.0, duration_s=3e6)[0]
+    assert times == pytest.approx(1000.0 * low, rel=1e-3)
+    assert low[:20].max() > 10.0  # no crumb
+
+
+@pytest.mark.parametrize("flight_path_rad", np.linspace(-0.045, -0.025, 5))
+def test_an_event_whose_function_is_rounded_far_from_zero_takes_few_looks(flight_path_rad):
+    """The altitude is a difference of radii, to 1e-9 m; each look asks for two derivatives at its end."""
+    model = load_model("tests.benchmarks.models.ballistic_adaptive")
+    times, end = counted(model, flight_path_rad=flight_path_rad, tolerance=1e-11)
+    assert np.count_nonzero(abs(times - end) < 1e-4) <= 2 * 4
