@@ -80,7 +80,8 @@ class FootprintFigure:
     longitude : str, column [deg]
     title : str
     ends_below : tuple (column, value) or None; a case whose column is above the value has not landed
-    planet : str, the setting that names the planet; empty for the Earth; no footprint for cases that differ in it
+    planet : str, the setting that names the planet, one of earth, mars, moon, venus; empty for the Earth; no footprint
+        on another one, or for cases that differ in it
     target : tuple of two columns or parameters, latitude and longitude of the target; without it distances are
         measured from the end of the nominal case
 

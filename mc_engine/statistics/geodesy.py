@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from pyproj import Geod
 
 WGS84 = (6378137.0, 1.0 / 298.257223563)  # equatorial radius [m], flattening; NGA.STND.0036, table 3.1
-# Equatorial radius [m] and flattening by the name of a planet; Mars and Venus as spheres, B. A. Archinal et al.,
-# Celestial Mechanics and Dynamical Astronomy 130:22 (2018), tables 1 and 4.
-ELLIPSOIDS = {"earth": WGS84, "mars": (3396190.0, 0.0), "venus": (6051800.0, 0.0)}
+# Equatorial radius [m] and flattening by the name of a planet; Mars, Moon and Venus as spheres, B. A. Archinal et al.,
+# Celestial Mechanics and Dynamical Astronomy 130:22 (2018).
+ELLIPSOIDS = {"earth": WGS84, "mars": (3396190.0, 0.0), "moon": (1737400.0, 0.0), "venus": (6051800.0, 0.0)}
 MOST_ROUNDS = 20
 CLOSE_ENOUGH = 1e-3  # m, of the middle
 

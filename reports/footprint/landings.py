@@ -6,7 +6,7 @@ import numpy as np
 
 from mc_engine.model.figures import FootprintFigure
 from mc_engine.statistics.footprint import Footprint, footprint
-from mc_engine.statistics.geodesy import ELLIPSOIDS, WGS84, LocalPlane
+from mc_engine.statistics.geodesy import ELLIPSOIDS, LocalPlane
 from reports.footprint.map_files import Mark
 from reports.run.flown import Flown
 from reports.text.numbers import count, limit_number, with_unit
@@ -79,6 +79,8 @@ def landing_of(flown: Flown, figure: FootprintFigure) -> Landing | str:
     planet = planet_of(flown, figure)
     if not planet:
         return f"{figure.title}: not drawn; the cases differ in the {flown.words(figure.planet)}."
+    if planet not in ELLIPSOIDS:
+        return f"{figure.title}: not drawn; the size of “{planet}” is not known, only that of {', '.join(ELLIPSOIDS)}."
     latitude, longitude = flown.values(figure.latitude), flown.values(figure.longitude)
     placed = _placed(flown, figure)
     rows = np.flatnonzero(placed & _down(flown, figure))
@@ -86,8 +88,7 @@ def landing_of(flown: Flown, figure: FootprintFigure) -> Landing | str:
     if not rows.size:
         high = f"; {count(above)} ended above {height_limit(flown, figure)}" if above else ""
         return f"{figure.title}: not drawn; none of {count(flown.n_held)} cases has an impact point{high}."
-    ellipsoid, confidence = ELLIPSOIDS.get(planet, WGS84), flown.stated.confidence
-    measured = footprint(latitude[rows], longitude[rows], ellipsoid, flown.random, confidence)
+    measured = footprint(latitude[rows], longitude[rows], ELLIPSOIDS[planet], flown.random, flown.stated.confidence)
     if measured is None:
         return f"{figure.title}: not drawn; the {count(rows.size)} impact points lie too far apart for one figure."
     if measured.reach < 1.0 and rows.size > 1:
@@ -153,7 +154,7 @@ def planet_of(flown: Flown, figure: FootprintFigure) -> str:
 
 
 def on_earth(flown: Flown, figure: FootprintFigure) -> bool:
-    return planet_of(flown, figure) not in ELLIPSOIDS or planet_of(flown, figure) == "earth"
+    return planet_of(flown, figure) == "earth"
 
 
 def _aim(flown: Flown, figure: FootprintFigure) -> Mark | None:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from mc_engine.model.figures import FootprintFigure, HistoryFigure
-from mc_engine.statistics.geodesy import ELLIPSOIDS, WGS84, middle_plane
+from mc_engine.statistics.geodesy import ELLIPSOIDS, middle_plane
 from mc_engine.statistics.picked_cases import picked_rows
 from mc_engine.store.run_files import NOMINAL_CASE
 from reports.document.blocks import FigureBlock
@@ -110,12 +110,12 @@ def _line(run: int, x: np.ndarray, y: np.ndarray, what: str) -> Line:
 
 
 def _footprint(runs: tuple[Flown, Flown], figure: FootprintFigure) -> Plot | None:
-    """Impact points in the plane about the mean impact point of run A; None for runs on different planets."""
+    """Impact points in the plane about the mean impact point of run A; None on different or unknown planets."""
     places = [landed(run, figure) for run in runs]
     planet, other = (planet_of(run, figure) for run in runs)
-    if min(latitude.size for latitude, _ in places) == 0 or not planet or planet != other:
+    if min(latitude.size for latitude, _ in places) == 0 or planet not in ELLIPSOIDS or planet != other:
         return None
-    plane = middle_plane(*places[0], ELLIPSOIDS.get(planet, WGS84))
+    plane = middle_plane(*places[0], ELLIPSOIDS[planet])
     if plane is None:
         return None
     marks = []

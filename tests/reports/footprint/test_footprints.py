@@ -140,6 +140,19 @@ def test_another_planet_has_its_own_size_and_no_files_for_a_globe():
     assert axes[0] / axes[1] == pytest.approx(3396.19 / 6378.0, rel=5e-3)
 
 
+@pytest.mark.parametrize(("planet", "radius"), [("moon", 1737.4), ("titan", None)])
+def test_landings_on_the_moon_have_its_size_and_those_on_an_unknown_planet_no_footprint(planet, radius):
+    """Both had the ellipsoid of the Earth, and its coasts: regions on the Moon were 3.7 times too large."""
+    settings = [{"name": "planet", "unit": "", "description": "", "value": planet}]
+    document = build(landing_run(settings=settings), "run")
+    assert document.files == ()
+    if radius is None:
+        assert "the size of “titan” is not known, only that of earth, mars, moon, venus." in sentences(document)
+        return
+    axes = [float(blocks(one, Table)[0].rows[0][4].text.split()[0]) for one in (document, build(landing_run(), "run"))]
+    assert axes[0] / axes[1] == pytest.approx(radius / 6378.0, rel=5e-3)
+
+
 def test_the_regions_have_the_confidence_of_the_report():
     """With `confidence = 0.99` under [report] they kept 90 %, and were too small for it."""
     inside = {}
