@@ -11,6 +11,7 @@ from reports.drawing.ticks import MOST_TICKS
 from reports.text.numbers import SPACE, count, number
 
 MOST_MARGIN = 1.0  # of the reach of the limits, either way; margins beyond are drawn at the edge
+ROWS_TOGETHER = 16  # of a panel of margins: with names of four lines it fits on a page
 TONES = {"good": GREEN, "bad": VERMILION, "open": MUTED}
 SPREAD = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)  # probabilities of what is drawn of a level
 SPANS = ((0, 6, MUTED, 1.2, "all cases", 1), (1, 5, SKY, 7.0, "5 % to 95 %", 20),
@@ -25,9 +26,7 @@ def margin_figure(names: Sequence[str], margins: np.ndarray, tones: Sequence[str
     margins : float64[n, 2], the demonstrated one, NaN if there is none, and that of the worst case.
     tones : of the verdicts, "good", "bad" or "open".
     """
-    place = np.arange(len(names), dtype=np.float64)
     bound, worst = 100.0 * np.clip(margins.T, -MOST_MARGIN, MOST_MARGIN)
-    known = np.flatnonzero(np.isfinite(bound)).tolist()
     words = [
         ["none" if margin != margin else f"{number(100.0 * margin, 3, up=False)}{SPACE}%" for margin in row]
         for row in margins.tolist()
@@ -37,18 +36,23 @@ def margin_figure(names: Sequence[str], margins: np.ndarray, tones: Sequence[str
         f"{name}: demonstrated {demonstrated}, worst case {worst_case}"
         for name, (demonstrated, worst_case) in zip(names, words, strict=True)
     ]
-    x, y, colours, told = bound[known], place[known], [TONES[tones[k]] for k in known], [texts[k] for k in known]
-    key = "demonstrated bound (tolerance limit)"
-    marks = (
-        Bar(np.fmin(x, 0.0), np.fmax(x, 0.0), y - 0.3, y + 0.3, colours, 0.35, told),
-        Points(x, y, BLUE, key, "diamond", 9.0, texts=told, key=key * bool(known)),
-        Points(worst, place, INK, "worst case", "x", 8.0, texts=texts, key="worst case"),
-        Limit(0.0, "x", VERMILION, "limit", key="limit"),
-    )
-    ends = np.r_[x, worst, 0.0]
+    ends = finite([bound, worst, 0.0])
     across = Axis("margin relative to the limits [%]", reach=(float(ends.min()) - 5.0, float(ends.max()) + 5.0))
-    plot = Plot(marks, across, names_axis(labels, down=True), height=70.0 + 26.0 * len(names))
-    return Drawing("Margins relative to the limits", (plot,), 1, "; ".join(texts))
+    plots = []
+    for rows in np.array_split(np.arange(len(names)), -(-len(names) // ROWS_TOGETHER)):
+        place, known = np.arange(rows.size, dtype=np.float64), np.isfinite(bound[rows])
+        x, y, told = bound[rows][known], place[known], [texts[k] for k in rows[known].tolist()]
+        colours = [TONES[tones[k]] for k in rows[known].tolist()]
+        key = "demonstrated bound (tolerance limit)"
+        marks = (
+            Bar(np.fmin(x, 0.0), np.fmax(x, 0.0), y - 0.3, y + 0.3, colours, 0.35, told),
+            Points(x, y, BLUE, key, "diamond", 9.0, texts=told, key=key * bool(told)),
+            Points(worst[rows], place, INK, "worst case", "x", 8.0, texts=[texts[k] for k in rows], key="worst case"),
+            Limit(0.0, "x", VERMILION, "limit", key="limit"),
+        )
+        up = names_axis([labels[k] for k in rows], down=True)
+        plots.append(Plot(marks, across, up, height=70.0 + 26.0 * rows.size))
+    return Drawing("Margins relative to the limits", tuple(plots), 1, "; ".join(texts))
 
 
 @dataclass(frozen=True)

@@ -215,6 +215,20 @@ def test_names_of_rows_that_are_broken_into_lines_do_not_overlap():
     assert np.diff(np.sort(places)).min() >= 0.9 * lettering.LINE
 
 
+def test_margins_of_many_requirements_continue_on_the_next_page():
+    """Of 200 in one panel the PDF had the 39 in the middle, without the axis: the page cut off the others."""
+    names = [f"{'a requirement with a name that is far too long for one line ' * 3}{k}" for k in range(200)]
+    margins = np.linspace(-0.2, 0.8, 400).reshape(200, 2)
+    drawing = margin_figure(names, margins, ["good"] * 200)
+    heights = [float(re.search(r'height="([0-9.]+)pt"', strip)[1]) for strip in paper.strips(drawing)]
+    assert heights[0] + max(heights[1:]) < 700.0  # points of a page, less two lines of caption
+    bounds = np.concatenate([plot.marks[1].x for plot in drawing.plots])
+    assert bounds == pytest.approx(100.0 * margins[:, 0])
+    told = [text for plot in drawing.plots for _, text in plot.y.ticks]
+    assert [text.partition(",")[0] for text in told] == names
+    assert len({plot.x.reach for plot in drawing.plots}) == 1
+
+
 def test_a_label_too_long_for_its_panel_is_broken_into_lines():
     label = Axis("a metric with a name of very many words that nobody would type twice in all his life [kg m²]")
     plot = Plot((Points(np.arange(3.0), np.arange(3.0), INK),), label, Axis("y"))
