@@ -42,9 +42,14 @@ class Envelope:
     rising: bool = False
 
     def bands(self, upright: bool = False, way: str = "") -> Iterator[Band]:
-        """The widest first.  upright : the levels lie along y;  way : for the words, of flights up or down."""
+        """The widest first, without one that so few cases support nowhere.
+
+        upright : the levels lie along y;  way : for the words, of flights up or down.
+        """
         known = sorted(self.curves)
         for low, high, opacity in zip(known, known[::-1], OPACITIES, strict=False):
+            if not np.isfinite(self.curves[low]).any():
+                continue
             reach = "smallest to largest" if low == 0.0 else f"{percent(low, 3)} to {percent(high, 3)}"
             words = f"{reach} of {count(self.n_cases)} saved cases{way}"
             yield between(self.at, self.curves[low], self.curves[high], SKY, opacity, words, words, upright)

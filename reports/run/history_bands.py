@@ -26,6 +26,12 @@ def envelope_probabilities(n_cases: int) -> tuple[float, ...]:
     return (0.0, outer, 0.5, 1.0 - outer, 1.0)
 
 
+def supported(probability: float, n_cases: np.ndarray) -> np.ndarray:
+    """bool[n]: whether a curve of an envelope is drawn where so many cases count; the extremes always are."""
+    enough = (n_cases >= FEWEST_CASES) & (n_cases * min(probability, 1.0 - probability) >= 1.0)
+    return enough | (probability in (0.0, 1.0))
+
+
 def fair_cases(flown: Flown) -> list[int]:
     """Of the cases with a saved history those that stand for all: 0, 1, 2, ... up to the first gap; none of a design.
 
@@ -120,8 +126,7 @@ def _envelope(instants: _Instants, y: np.ndarray) -> Envelope:
         high = np.minimum(low + 1, flying - 1)
         columns = np.arange(flying.size)
         below, above = table[low, columns], table[high, columns]
-        enough = (flying >= FEWEST_CASES) & (flying * min(probability, 1.0 - probability) >= 1.0)
-        supported = enough | (probability in (0.0, 1.0))
-        curves[probability] = np.where(supported, below + (place - low) * (above - below), np.nan)
+        quantile = below + (place - low) * (above - below)
+        curves[probability] = np.where(supported(probability, flying), quantile, np.nan)
     instants.reach_peaks(curves, y, values)
     return Envelope(instants.grid, curves, instants.n_flights)

@@ -9,7 +9,7 @@ from mc_engine.model.figures import ProfileFigure
 from reports.document.blocks import FigureBlock
 from reports.figures.histories import Envelope, profile_figure
 from reports.run.flown import Flown
-from reports.run.history_bands import FEWEST_CASES, envelope_probabilities, fair_cases
+from reports.run.history_bands import FEWEST_CASES, envelope_probabilities, fair_cases, supported
 from reports.sections.figure_blocks import COLOURED_OVER_BANDS, history_cases, history_line
 
 LEVELS = 200
@@ -59,7 +59,8 @@ def _band_words(flown: Flown, figure: ProfileFigure, bands: tuple[Envelope, ...]
     return (
         f" The envelopes are of {x} at equal {y} on the way {ways}, over the first {bands[0].n_cases} saved cases. "
         f"Of a flight that {again} again, the first way {'up' if bands[0].rising else 'down'} to a level counts; "
-        f"a level that fewer than {FEWEST_CASES} flights reach has no band."
+        f"a level that fewer than {FEWEST_CASES} flights reach has no band, and percentiles end "
+        "where the flights are too few for them."
     )
 
 
@@ -115,10 +116,14 @@ def _first_passage_envelope(flights: list[np.ndarray], levels: np.ndarray, risin
     way = -1.0 if rising else 1.0
     asked = np.sort(way * levels)
     table = np.array([first_descent(flight[:, 0], way * flight[:, 1], asked) for flight in flights])[:, :: int(way)]
-    used = np.count_nonzero(np.isfinite(table), axis=0) >= FEWEST_CASES
+    reached = np.count_nonzero(np.isfinite(table), axis=0)
+    used = reached >= FEWEST_CASES
     if np.count_nonzero(used) < 2:
         return None
-    curves = {p: np.nanquantile(table[:, used], p, axis=0) for p in envelope_probabilities(len(flights))}
+    curves = {
+        p: np.where(supported(p, reached[used]), np.nanquantile(table[:, used], p, axis=0), np.nan)
+        for p in envelope_probabilities(len(flights))
+    }
     return Envelope(levels[used], curves, len(flights), rising)
 
 

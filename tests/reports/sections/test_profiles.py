@@ -83,6 +83,26 @@ def test_an_ascent_has_a_band_of_the_way_up_alone():
     assert band.curves[0.5] == pytest.approx(15.0 + np.sqrt(band.at), abs=0.02)
 
 
+def test_percentiles_end_where_too_few_flights_come_to_a_level():
+    """Flights that end at heights from 1 to 2: the band of 2.5 % to 97.5 % went on where only 20 of 60 still climb."""
+    (band,) = profile_bands(flights(60, lambda s, k: (s + k, s * (1.0 + k / 59.0))), range(60), "x_m", "y_m")
+    climbing = np.count_nonzero(1.0 + np.arange(60)[:, None] / 59.0 >= band.at - 1e-9, axis=0)
+    assert sorted(band.curves) == [0.0, 0.025, 0.5, 0.975, 1.0]
+    assert (
+        np.isfinite(band.curves[0.025]).tolist()
+        == np.isfinite(band.curves[0.975]).tolist()
+        == (climbing >= 40).tolist()
+    )
+    assert np.isfinite([band.curves[p] for p in (0.0, 0.5, 1.0)]).all()
+    assert climbing.min() == 20
+
+
+def test_percentiles_that_no_level_supports_are_not_in_the_key():
+    """All of 60 flights have a stretch of the heights of their own, which at most 30 share."""
+    (band,) = profile_bands(flights(60, lambda s, k: (s + k, s + k / 30.0)), range(60), "x_m", "y_m")
+    assert [words.key.split(" of ")[0] for words in band.bands(upright=True)] == ["smallest to largest"]
+
+
 @pytest.mark.parametrize("turns", [1, 4])
 def test_closed_curves_have_no_band(turns):
     def path(s, case):
