@@ -170,10 +170,9 @@ def warnings(flown: Flown) -> tuple[str, ...]:
         every = "The only case" if flown.n_tried == 1 else f"All {count(flown.n_tried)} cases"
         sentences.append(f"{every} failed: no metric has a number.")
     elif failed := flown.n_tried - flown.every.completed:
-        sentences.append(
-            f"{count(failed)} of {count(flown.n_tried)} cases failed; "
-            f"{'it counts' if failed == 1 else 'they count'} against every requirement."
-        )
+        counted = f"{'it counts' if failed == 1 else 'they count'} against every requirement"
+        consequence = counted if flown.verdicts else "the statistics of the metrics are of the other cases"
+        sentences.append(f"{count(failed)} of {count(flown.n_tried)} cases failed; {consequence}.")
     status, reason = (str(flown.nominal.get(name) or "") for name in ("status", "reason"))
     if reason == NO_NOMINAL:
         sentences.append(f"{reason.capitalize()}.")

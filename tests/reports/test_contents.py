@@ -277,6 +277,16 @@ def test_a_campaign_without_requirements_figures_or_dispersions_still_reports():
     assert "published" not in [section.anchor for section in document.sections]
 
 
+def test_failed_cases_are_said_to_count_only_against_requirements_that_there_are():
+    """Without one, "they count against every requirement" hid that the statistics are of the other cases alone."""
+    for asked, said in (
+        ([], "the statistics of the metrics are of the other cases"),
+        (None, "they count against every"),
+    ):
+        run = synthetic_run(50, failed=3, **({} if asked is None else {"requirements": asked}))
+        assert f"3 of 50 cases failed; {said}" in build(run, RUN).warnings[0]
+
+
 def test_constant_and_empty_metrics_are_named_and_not_drawn():
     run = synthetic_run(200, failed=0)
     run.table["pulse_count"] = 3.0
