@@ -100,14 +100,7 @@ def next_length(length, error, ideal, last_ideal):
 
 
 def _first_length(f, t, s, k, m, p, o, atol, rtol, order, longest):
-    """A first step length [s], from the sizes of the state and of its first two derivatives, d0, d1 and d2.
-
-    These are taken as in Hairer, Norsett, Wanner, section II.4, "Starting step size", and in units of the tolerance.
-    If each further derivative is larger by the same factor, `pace` [1/s], the term of the method's order in the Taylor
-    series of the state is as large as the tolerance after d0**(-1/order) / pace.  Their own guess, which is for the
-    case that state or derivative is zero, has another length if seconds are counted as minutes, and is often too short
-    by a factor of a hundred.
-    """
+    """A first step length [s]: Hairer, Norsett, Wanner, section II.4, "Starting step size"."""
     n = float(len(atol))
     per_tolerance = map_fields(weight, s, s, atol, rtol)
     d0 = sqrt(total(map_fields(weighted_square, s, per_tolerance)) / n)
@@ -118,9 +111,7 @@ def _first_length(f, t, s, k, m, p, o, atol, rtol, order, longest):
     d2 = sqrt(total(map_fields(weighted_square, map_fields(_difference, later, k), per_tolerance)) / n) / h
     steep = maximum(d1, d2)
     flat = steep <= 1e-15
-    pace = maximum(d1 / where(small, 1.0, d0), d2 / where(small, 1.0, d1))
-    share = where(small, 0.01 / where(flat, 1.0, steep), 1.0 / where(small, 1.0, d0))
-    guess = exp(log(share) / order) / where(small, 1.0, pace)
+    guess = exp(log(0.01 / where(flat, 1.0, steep)) / order)
     length = minimum(minimum(100.0 * h, where(flat, maximum(1e-6, 1e-3 * h), guess)), longest)
     return where(length == length, length, longest)  # of a derivative that is not a number no length can be told
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flown_models import FOLDER, OSCILLATOR, flown, inputs_of, same_bytes
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from mc_engine.flight.flight import fly_history, fly_interpreted
@@ -239,13 +240,20 @@ def counted(model, **inputs):
     return np.array(flight.times), end
 
 
-def test_an_orbit_takes_the_steps_of_one_of_the_same_shape_a_hundred_times_as_large(orbit):
-    """By Kepler's third law a thousand times as slow; a first step that depends on the unit of time is not similar."""
-    low = counted(orbit, radius_m=7e6, speed_m_s=8000.0, duration_s=3000.0)[0]
-    high = replace(orbit, clock=replace(orbit.clock, atol=(1e-3, 1e-3, 1e-9, 1e-9)))
-    times = counted(high, radius_m=7e8, speed_m_s=800.0, duration_s=3e6)[0]
-    assert times == pytest.approx(1000.0 * low, rel=1e-3)
-    assert low[:20].max() > 10.0  # no crumb
+@pytest.mark.parametrize("method", ["dop853", "dp54"])
+def test_the_first_steps_of_a_trimmed_vehicle_see_what_its_elevator_does(method):
+    """Its state changes by 4e-5 of itself in a second, but is far from trim a second after a doublet begins."""
+    trimmed = load_model("trimmed.py", FOLDER)
+    starts = np.array([0.0, 0.1, 0.5, 1.0])
+    columns = flown(replace(trimmed, clock=replace(trimmed.clock, method=method)), start_s=starts)
+
+    def angle(t, y, pull):
+        return [y[1] - 0.8 * y[0], 5.0 * pull - 4.0 * y[0] - y[1]]
+
+    first = solve_ivp(angle, (0.0, 0.5), [0.0, 0.0], args=(0.05,), rtol=1e-12, atol=1e-14, max_step=1e-3)
+    second = solve_ivp(angle, (0.5, 1.0), first.y[:, -1], args=(-0.05,), rtol=1e-12, atol=1e-14, max_step=1e-3)
+    top = 0.05 + max(first.y[0].max(), second.y[0].max())
+    assert columns["top_rad"] == pytest.approx(top, abs=1e-6)
 
 
 @pytest.mark.parametrize("flight_path_rad", np.linspace(-0.045, -0.025, 5))
