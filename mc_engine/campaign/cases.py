@@ -25,8 +25,8 @@ def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray
     """The dispersed inputs of any cases of a campaign, without flying them.
 
     campaign : Campaign
-    case_ids : int64[n], numbers of the cases, in any order.  For "mc" and "sobol" they may exceed the campaign's number
-        of cases: they are then cases of a campaign with more cases.
+    case_ids : int64[n], numbers of the cases, in any order.  Of a design that can be extended ("mc", "sobol",
+        "saltelli", "morris") they may exceed the campaign's number: they are then cases of a campaign with more cases.
 
     Returns a dict with one column per dispersion, in file order and declared units: float64[n], bool[n], or object[n]
     of words.  A row depends on (campaign, seed, case_id) alone.

@@ -74,10 +74,15 @@ class CampaignSection(Section):
     simulator: str | None = Field(
         default=None, min_length=1, description='in place of model: a module, or "sim.py" beside this file'
     )
-    cases: int | None = Field(default=None, ge=1, le=MOST_CASES, description="number of cases; random designs only")
+    cases: int | None = Field(
+        default=None, ge=1, le=MOST_CASES, description="number of cases; grid, one_at_a_time and table need none"
+    )
     design: DesignName = Field(description="how the cases are generated")
     seed: int | None = Field(
-        default=None, ge=0, le=2**63 - 1, description="any whole number from 0 on; random designs only"
+        default=None,
+        ge=0,
+        le=2**63 - 1,
+        description="any whole number from 0 on; grid, one_at_a_time and table need none",
     )
     table: str | None = Field(
         default=None, min_length=1, description='CSV or Parquet beside this file; for design = "table"'
@@ -86,7 +91,7 @@ class CampaignSection(Section):
         default=None,
         ge=1,
         le=MOST_STEPS,
-        description="most integration steps; a case that needs more ends as step-limit",
+        description="most steps of AdaptiveStep; a case that needs more ends as step-limit",
     )
     title: Line = Field(default="", description="one line for the report")
     note: Note = ""

@@ -200,7 +200,7 @@ class Case:
 
     @property
     def reason(self) -> str:
-        """Why the case was refused; else empty."""
+        """Why the case failed, if the flight tells; else empty."""
         return str(self.row["reason"])
 
     @property
