@@ -7,6 +7,7 @@ from toy import HERE, load, problems
 from mc_engine.campaign.cases import case_table, dispersion_records
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.errors import CampaignError
+from mc_engine.sampling.designs import BY_LEVELS, DESIGNS
 
 TEXT = """
 [campaign]
@@ -197,3 +198,13 @@ def test_a_design_in_blocks_takes_whole_blocks_and_independent_inputs(design, ca
     assert problems(f"cases = 12\n{body}", design) == {}
     pair = '[[correlation]]\nbetween = ["mass_kg", "delay_s"]\nrank = 0.3\n'
     assert "is for independent inputs" in problems(f"cases = 12\n{body}{pair}", design)["correlation"]
+
+
+@pytest.mark.parametrize("key", ["cases", "seed"])
+@pytest.mark.parametrize("design", sorted({*DESIGNS} - {*BY_LEVELS, "table"}))
+def test_a_missing_number_of_cases_or_seed_is_described_by_the_designs_that_need_none(design, key):
+    lines = ['model = "campaigns.deorbit"', f'design = "{design}"', "cases = 64", "seed = 1"]
+    text = "\n".join(["[campaign]", *(line for line in lines if not line.startswith(key))])
+    said = rf"campaign\.{key}: is missing: [^;]*; grid, one_at_a_time and table need none"
+    with pytest.raises(CampaignError, match=said):
+        load_campaign("x", text=text + '\n[dispersion.ve_pct]\ndist = "normal"\nsigma = 1.0\n')
