@@ -59,7 +59,8 @@ def _checked_ids(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
     refuse_no_campaign(campaign)
     given = np.atleast_1d(case_ids)
     if given.ndim > 1 or (given.size and given.dtype.kind not in "iu"):
-        message = f"a case is a whole number from 0 to {campaign.cases - 1}, and {given.tolist()[0]!r} is none"
+        one: Any = next(iter(given.tolist()), [])
+        message = f"a case is a whole number from 0 to {campaign.cases - 1}, and {one!r} is none"
         raise CampaignError(campaign.name, [Problem("", message)])
     ids = given.astype(np.int64)
     if campaign.first is not None:

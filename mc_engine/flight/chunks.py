@@ -30,7 +30,7 @@ Guard = Callable[[np.ndarray], AbstractContextManager[Any]]
 
 
 def chunk_size(cases: int, workers: int, flyer: Flyer | type[Flyer] = Flyer) -> int:
-    """How many cases a worker flies at a time, and a part holds, by default: as many chunks for each worker."""
+    """How many cases a worker flies at a time, and a part holds, by default; all workers have equally many parts."""
     each = max(flyer.chunks_per_worker, -(-cases // (workers * flyer.largest_chunk)))
     return max(-(-cases // (each * workers)), flyer.smallest_chunk)
 
