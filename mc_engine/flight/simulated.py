@@ -161,7 +161,8 @@ class SimulatorFlyer(Flyer):
                 lines[0] += ", or `replay` finds other bits; where they differ by rounding alone, set deterministic to "
                 lines[0] += "false, and a tolerance"
         still = [name for name in self._names if first[name] == dispersed[name]]
-        if still and dispersed["status"] == first["status"] == STATUS_NAME[OK]:
+        moved = self._campaign.first is None  # else case 0 has no inputs yet but the nominal ones
+        if moved and still and dispersed["status"] == first["status"] == STATUS_NAME[OK]:
             lines.append(f"the same in the nominal and in case 0: {', '.join(still)}; does an input move it?")
         if self.simulator.batch:
             lines += self._of_a_batch()

@@ -1,0 +1,27 @@
+"""A chain of simulators whose first campaign has yet to be flown."""
+
+from tests.mc_engine.command_line.cart import call
+
+SIMULATOR = """
+from mc_engine import Parameter, Simulator
+from mc_engine.model import inputs, metrics
+
+def fly(inputs, case):
+    return {"twice_m": 2.0 * inputs["length_m"]}
+
+SIMULATOR = Simulator("twice", inputs(length_m=Parameter(1.0, "length")), metrics(twice_m="double"), fly=fly)
+"""
+HEAD = '[campaign]\nsimulator = "factor.py"\ndesign = "mc"\nseed = 1\n'
+DISPERSED = 'cases = 20\n[dispersion.length_m]\ndist = "normal"\nsigma = 0.1\n'
+
+
+def test_check_does_not_ask_whether_an_input_moves_a_metric_where_no_input_was_moved(tmp_path):
+    """Without inputs from upstream case 0 is the nominal one, and every metric was said to be the same in both."""
+    (tmp_path / "factor.py").write_text(SIMULATOR)
+    (tmp_path / "first.toml").write_text(HEAD + DISPERSED)
+    (tmp_path / "second.toml").write_text(HEAD + '[inputs]\nfrom = "first.toml"\ncolumns = { length_m = "twice_m" }\n')
+    (tmp_path / "idle.toml").write_text(HEAD + DISPERSED.replace("0.1", "1e-30"))
+    for name, asked in [("first", False), ("second", False), ("idle", True)]:
+        checked = call("check", tmp_path / f"{name}.toml")
+        assert checked.exit_code == 0, checked.output
+        assert ("does an input move it?" in checked.stdout) == asked
