@@ -13,6 +13,7 @@ that it still has the lock.
 import errno
 import json
 import os
+import secrets
 import socket
 import time
 from collections.abc import Callable, Iterator
@@ -82,7 +83,8 @@ class WriterLock:
                     way_out = f"this file system has no locks: if that process is over, delete {self.path}"
                     raise _BusyError(f"{described(before)} is writing here; {way_out}")
                 record = {"pid": os.getpid(), **_here(), "since": utc_now(), "start": _start(os.getpid())}
-                content = json.dumps({**record, "locks": bool(locked)}).encode()
+                own = secrets.token_hex(4)  # the next writer may be of the same process and instant
+                content = json.dumps({**record, "locks": bool(locked), "own": own}).encode()
                 _overwrite(self.path, locked, content)
             self._locked, self._record, self._held = locked, content, held.pop_all()
         return before

@@ -128,7 +128,8 @@ def test_a_writer_without_system_locks_whose_lock_is_deleted_writes_nothing_more
     assert open_store(store.path).committed() == [(0, 20)]
 
 
-def test_a_writer_that_has_lost_its_lock_leaves_the_record_of_the_next_one(store, no_locks):
+def test_a_writer_that_has_lost_its_lock_leaves_the_record_of_the_next_one(store, no_locks, monkeypatch):
+    monkeypatch.setattr("mc_engine.store.writer_lock.utc_now", lambda: "2026-01-01T00:00:00Z")  # within one instant
     lost = store.lock()
     lost.__enter__()
     (store.path / ".lock").unlink()
