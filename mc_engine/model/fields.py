@@ -251,7 +251,8 @@ class AdaptiveStep:
         counts where a state passes through zero: far too small a value, as 1e-9 m in an orbit, makes steps short there.
     control_period : float, str or function of the settings, time [s] between calls of `control`, which happen at whole
         multiples from t = 0, and only in phases with a control; steps end there.  Required by a model with `control`
-    method : str, "dop853" (order 8) or "dp54" (order 5)
+    method : str, "dop853" (order 8), "tp86" (order 8, with an estimate of order 6; one of its stages lies 0.7 % of a
+        step beyond the step's end) or "dp54" (order 5)
     attempts : int, a case that needs more steps, accepted and rejected ones together, ends as step-limit; at most 1e9
     first_step : float, length [s] of the first attempt; with 0 the engine chooses it
     longest_step : float or str, limit of the length of a step [s].  A step may not see what acts for a shorter time

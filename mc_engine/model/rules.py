@@ -31,7 +31,7 @@ _HISTORY_COLUMNS = ("case_id", "t_s")
 _ACTIONS = ("stop", "switch")
 _MOST_ATTEMPTS = 1e9  # of a case, as there are steps on a fixed grid: minutes of one core
 _MULTISTEP = tuple(f"abm{order}" for order in range(8, 13)) + tuple(f"gj{order}" for order in range(6, 11))
-METHODS = {"FixedStep": ("rk4", *_MULTISTEP), "AdaptiveStep": ("dop853", "dp54")}
+METHODS = {"FixedStep": ("rk4", *_MULTISTEP), "AdaptiveStep": ("dop853", "tp86", "dp54")}
 
 
 def refuse_contradictions(model: "Model") -> None:

@@ -31,7 +31,7 @@ from tests.benchmarks.peer_codes.problems import Problem  # noqa: E402
 TABLE = Path(__file__).with_suffix(".parquet")
 CODES = {"heyoka": "taylor", "nyx": "nyx", "Basilisk": "basilisk"}  # peer -> file in peer_codes
 TARGETS = (1.0, 1e-3, 1e-5)  # m
-METHODS = ("RK4", "ABM10", "ABM12", "GJ8", "GJ9", "GJ10", "DOP853", "DP54")
+METHODS = ("RK4", "ABM10", "ABM12", "GJ8", "GJ9", "GJ10", "DOP853", "TP86", "DP54")
 
 
 def peer(name: str):

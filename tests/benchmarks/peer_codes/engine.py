@@ -92,7 +92,7 @@ def entrant(problem: Problem, method: str, width: int = 0, ladder: tuple[float, 
         return shared([kernel_flight(part, method, value, width) for part in parts])
 
     form = f"{method}, {f'{width} cases at a time' if width > 1 else 'one case at a time'}"
-    if method in ("DOP853", "DP54"):
+    if method in ("DOP853", "TP86", "DP54"):
         return Entrant("engine", form, problem, "tolerance", ladder or TOLERANCES, build)
     steps = ENTRY_STEPS if problem.height else ORBIT_STEPS if method == "RK4" else ARC_STEPS
     return Entrant("engine", form, problem, "step", ladder or steps, build)

@@ -100,12 +100,13 @@ def _orbits(key, title, models, nominal, sigma, air, seed, great_step):
     names = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
     inputs: dict[str, Any] = dict(zip(names, first, strict=True)) | {"ballistic_coefficient_kg_m2": coefficient}
     parameters = (-0.5 / coefficient)[None] if air else np.empty((0, CASES))
-    rate = rates.dragged(air) if air else rates.oblate
-    return Problem(key, title, models, inputs | {"duration_s": DAY}, first, parameters, rate, DAY, great_step)
+    rate, inputs = rates.dragged(air) if air else rates.oblate, inputs | {"duration_s": DAY}
+    sizes = (math.hypot(*nominal[:3]),) * 3 + (math.hypot(*nominal[3:]),) * 3
+    return Problem(key, title, models, inputs, first, parameters, rate, DAY, great_step, sizes=sizes)
 
 
 def _methods(name: str) -> dict[str, str]:
-    return {"RK4": f"{name}_rk4", "DOP853": f"{name}_adaptive", "DP54": f"{name}_dp54"}
+    return {"RK4": f"{name}_rk4", **dict.fromkeys(("DOP853", "TP86", "DP54"), f"{name}_adaptive")}
 
 
 def _with_multistep(models: dict[str, str]) -> dict[str, str]:
@@ -147,7 +148,7 @@ def oblate() -> Problem:
 @cache
 def two_body() -> Problem:
     """A day around a point mass."""
-    models = _with_multistep({"RK4": "two_body_rk4", "DOP853": "two_body_adaptive"})
+    models = _with_multistep(_methods("two_body"))
     problem = _orbits("two_body", "two-body orbit, one day", models, LOW_ORBIT, (100, 0.1), None, 4, 240.0)
     return replace(problem, rate=rates.two_body)
 

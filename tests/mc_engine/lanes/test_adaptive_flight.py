@@ -76,7 +76,7 @@ def kepler(t, v=8000.0, r=7e6):
     return np.array([a * (np.cos(anomaly) - e), a * np.sqrt(1.0 - e * e) * np.sin(anomaly)])
 
 
-@pytest.mark.parametrize(("method", "order", "longest"), [("dop853", 8, 200.0), ("dp54", 5, 25.0)])
+@pytest.mark.parametrize(("method", "order", "longest"), [("dop853", 8, 200.0), ("tp86", 8, 400.0), ("dp54", 5, 25.0)])
 def test_the_error_falls_with_the_order_of_the_method(orbit, method, order, longest):
     """Tolerances that allow anything, and samples of the control that hold the step: halve it, and see."""
     errors = []
@@ -240,7 +240,7 @@ def counted(model, **inputs):
     return np.array(flight.times), end
 
 
-@pytest.mark.parametrize("method", ["dop853", "dp54"])
+@pytest.mark.parametrize("method", ["dop853", "tp86", "dp54"])
 def test_the_first_steps_of_a_trimmed_vehicle_see_what_its_elevator_does(method):
     """Its state changes by 4e-5 of itself in a second, but is far from trim a second after a doublet begins."""
     trimmed = load_model("trimmed.py", FOLDER)

@@ -86,7 +86,7 @@ def test_methods_are_compared_at_the_error_of_the_models_own(minimal):
     own, *others = compare_methods(minimal, 16, 1)
     assert own.clock.method == "rk4"
     assert [one.case_s for one in others] == sorted(one.case_s for one in others)
-    assert {"abm8", "abm12", "dop853", "dp54"} <= {one.clock.method for one in others}
+    assert {"abm8", "abm12", "dop853", "tp86", "dp54"} <= {one.clock.method for one in others}
     # rates of states are not declared
     assert not [one for one in others if one.clock.method.startswith("gj")]
     found = errors(minimal, [one.clock for one in (own, *others)], replace(own.clock, step=own.clock.step / 50.0))
@@ -99,7 +99,7 @@ def test_methods_are_compared_where_the_models_own_chooses_its_steps(minimal):
     chooses = replace(minimal, model=replace(minimal.model, clock=clock))
     own, *others = compare_methods(chooses, 16, 1)
     assert own.clock == clock
-    assert {"rk4", "abm8", "abm12", "dp54"} <= {one.clock.method for one in others}
+    assert {"rk4", "abm8", "abm12", "tp86", "dp54"} <= {one.clock.method for one in others}
     assert "dop853" not in {one.clock.method for one in others}
     exact = AdaptiveStep(1e9, 1e-13, (1e-8, 1e-8, 1e-11, 1e-11))
     found = errors(chooses, [one.clock for one in (own, *others)], exact)
