@@ -39,7 +39,7 @@ class Metric:
     def meaning(self, output: str) -> str:
         """The metric in words, made from the description of its output, such as "time of the smallest altitude"."""
         if self.event:
-            return f"{output} at the event {self.event}"
+            return f"{output} {'at' if self.output else 'of'} the event {self.event}"
         if self.extremum is None:
             return f"{output} at the end"
         if self.extremum.kind == "last_above":

@@ -60,7 +60,7 @@ def test_a_computed_metric_without_a_description_is_described_in_the_words_of_it
     )
     assert [item.description for item in campaign.model.metrics] == [
         "largest speed", "smallest altitude", "time of the largest speed", "speed at the end", "time at the end",
-        "altitude at the event apogee", "time at the event apogee", "last time of the speed above its level",
+        "altitude at the event apogee", "time of the event apogee", "last time of the speed above its level",
         "greatest speed",
     ]  # fmt: skip
 

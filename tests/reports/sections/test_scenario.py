@@ -6,6 +6,7 @@ from figure_marks import FORMS, marks_of
 from synthetic_run import synthetic_run
 
 from mc_engine.campaign.loading import load_campaign
+from mc_engine.model import time_of
 from mc_engine.runner.manifest import manifest_of
 from reports.contents import build
 from reports.document.blocks import FigureBlock, Table
@@ -47,10 +48,11 @@ def test_what_is_known_of_an_event_is_not_told_of_another_whose_name_is_the_begi
     assert rows["Exit burn"] == "size 3\u202fm/s"
 
 
-def test_a_time_whose_meaning_is_the_end_of_a_phase_is_an_event():
+@pytest.mark.parametrize("meaning", ["end of the second burn", time_of("burn_out").meaning("time")])
+def test_a_time_whose_meaning_is_an_event_is_in_the_timeline(meaning):
     run = synthetic_run(50, failed=0)
     run.manifest["columns"] += [
-        {"name": "burn_out_2_s", "unit": "s", "role": "metric", "description": "end of the second burn"},
+        {"name": "burn_out_2_s", "unit": "s", "role": "metric", "description": meaning},
         {"name": "on_time_x_s", "unit": "s", "role": "metric", "description": "time that the x thrusters fired"},
     ]
     run.table = run.table.assign(burn_out_2_s=90.0 + run.table["case_id"], on_time_x_s=3.0)
