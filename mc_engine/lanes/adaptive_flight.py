@@ -79,7 +79,8 @@ def _watched(armed, sense):
 def _root(kind, before, after, rate_before, rate_after, direction, low, high):
     """Length at which one sense meets zero: a cubic in the sense, with its rates at both sides, or its chord.
 
-    `high` where the sense does not cross.  The sense of a peak has no rate.
+    The middle where the sense still leaves zero, as after an event of the other direction: beside that event, rounding
+    decides on its sign.  `high` where the sense does not cross.  The sense of a peak has no rate.
     """
     across = crossed(before, after, direction)
     width, span = high - low, after - before
@@ -87,7 +88,8 @@ def _root(kind, before, after, rate_before, rate_after, direction, low, high):
     v = 1.0 - u
     cubic = low + width * (u * u * (3.0 - 2.0 * u)) + u * v * span * (v / rate_before - u / rate_after)
     usable = (kind != PEAK) & (cubic > low) & (cubic < high)
-    return where(across, where(usable, cubic, low + width * u), high)
+    leaves = (kind != PEAK) & (before * rate_before > 0.0)
+    return where(across, where(usable, cubic, low + width * where(leaves, 0.5, u)), high)
 
 
 @physics
@@ -330,8 +332,7 @@ def _fly(
             at_start, rates = map_fields(_watched, armed, here.senses), here.rates
             opened = Bracket(zero, trial, at_start, seen, rates, there.rates, zero, trial, zero, enough)
             bracket, back, near = narrow(kinds, signs, select(over, opened, bracket), seen, there.rates, over | looking)
-            beyond = select(back, there, beyond)
-            closing = closing | over
+            beyond, closing = select(back, there, beyond), closing | over
             closed = flying & closing & (near | (bracket.high - bracket.low <= bracket.width))
         arrived = fits | closed
         now = select(closed, beyond, there)
@@ -343,8 +344,7 @@ def _fly(
         stuck = stepping & (not ended) & (h <= 1e-14 * abs(here.t) + 1e-290)
         capped = flying & (not ended) & (attempts >= clock.attempts)
         size = total(end) + error
-        failure = where(stuck & (not (size - size == 0.0)), _BROKEN, _CAPPED)
-        status = where(stuck | capped, failure, status)
+        status = where(stuck | capped, where(stuck & (not (size - size == 0.0)), _BROKEN, _CAPPED), status)
         if must_stop:
             status = where(ended & (not stopped), _UNSTOPPED, status)
         recorded = arrived

@@ -1,4 +1,7 @@
-"""A throw under constant gravity that rises a little over a ceiling, where the model is asked to switch."""
+"""A throw under constant gravity that rises a little over a ceiling, where the model is asked to switch.
+
+Its axes are turned, so that the height of a fast throw along the ceiling is a sum of large, rounded numbers.
+"""
 
 from mc_engine.lanes import physics, sqrt
 from mc_engine.model import (
@@ -16,9 +19,13 @@ from mc_engine.model import (
 )
 
 GRAVITY, CEILING = 9.8, 100.0
+UP_X, UP_Y = 0.6, 0.8  # the direction upwards
 
-Inputs = inputs(excess_m=Parameter(0.1, "height of the top above the ceiling", low=0.0))
-State = states(h_m="height", v_m_s="speed upwards")
+Inputs = inputs(
+    excess_m=Parameter(0.1, "height of the top above the ceiling", low=0.0),
+    along_m_s=Parameter(0.0, "speed along the ceiling"),
+)
+State = states(x_m="x", y_m="y", vx_m_s="speed along x", vy_m_s="speed along y")
 Outputs = outputs(height_m="height")
 Metrics = metrics(
     rise_s=time_of("rise", "time of the way up through the ceiling"),
@@ -30,22 +37,23 @@ Metrics = metrics(
 
 @physics
 def initial(p):
-    return State(h=0.0, v=sqrt(2.0 * GRAVITY * (CEILING + p.excess)))
+    speed = sqrt(2.0 * GRAVITY * (CEILING + p.excess))
+    return State(x=0.0, y=0.0, vx=UP_X * speed - UP_Y * p.along, vy=UP_Y * speed + UP_X * p.along)
 
 
 @physics
 def rhs(s):
-    return State(h=s.v, v=-GRAVITY)
-
-
-@physics
-def ceiling(s):
-    return s.h - CEILING
+    return State(x=s.vx, y=s.vy, vx=-UP_X * GRAVITY, vy=-UP_Y * GRAVITY)
 
 
 @physics
 def height(s):
-    return s.h
+    return UP_X * s.x + UP_Y * s.y
+
+
+@physics
+def ceiling(s):
+    return height(s) - CEILING
 
 
 @physics
@@ -55,7 +63,7 @@ def switch(s, m):
 
 @physics
 def observe(s):
-    return Outputs(height=s.h)
+    return Outputs(height=height(s))
 
 
 MODEL = model(
