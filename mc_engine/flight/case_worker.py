@@ -136,7 +136,7 @@ class Worker:
         elif self._simulator.start is not None:
             self._shared = self._simulator.start()
         self._before = own_children()  # which `start` may have begun, and which live on
-        self._streams = {1: ("stdout", sys.stdout), 2: ("stderr", sys.stderr)}  # which it may have replaced
+        self._streams = {1: ("stdout", sys.stdout, os.dup(1)), 2: ("stderr", sys.stderr, os.dup(2))}
         self._folder = os.open(".", os.O_RDONLY)  # in which every case begins, wherever the one before it went
 
     def fly(self, order: Order, reply: Callable[[Any], None]) -> None:
@@ -193,6 +193,8 @@ class Worker:
                 os._exit(1)
             end_children(self._before)
             os.fchdir(self._folder)
+            for descriptor, (_, _, kept) in self._streams.items():
+                os.dup2(kept, descriptor)  # which the function may have closed
         try:
             return read(self._simulator, given, how)
         except ValueError as fault:
@@ -314,15 +316,14 @@ def settle(rule: str, work: Path, name: str, status: int, keep: Path | None, inp
         shutil.rmtree(work / name, ignore_errors=True)
 
 
-def _renew_streams(streams: Mapping[int, tuple[str, Any]]) -> None:
+def _renew_streams(streams: Mapping[int, tuple[str, Any, int]]) -> None:
     """Empty the files of stdout and stderr, and give both, by file descriptor, back to this process after a case."""
-    for descriptor, (name, own) in streams.items():
-        with suppress(OSError):
-            if os.fstat(descriptor).st_size:
-                os.ftruncate(descriptor, 0)
-            if getattr(own, "closed", False):
-                own = open(descriptor, "w", buffering=1, errors="backslashreplace", closefd=False)
-            setattr(sys, name, own)
+    for descriptor, (name, own, _) in streams.items():
+        if os.fstat(descriptor).st_size:
+            os.ftruncate(descriptor, 0)
+        if getattr(own, "closed", False):
+            own = open(descriptor, "w", buffering=1, errors="backslashreplace", closefd=False)
+        setattr(sys, name, own)
 
 
 def end_of(path: Path) -> bytes:
