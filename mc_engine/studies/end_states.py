@@ -24,8 +24,9 @@ _DAY_S = 86_400.0
 
 
 def end_columns(store: Store) -> list[str]:
-    """case_id, status, and time and state at the end: the columns of an export by default."""
-    return ["case_id", "status", *(column.name for column in store.columns if column.role == "state")]
+    """The columns of an export by default: case_id, status, time and state at the end; metrics without states."""
+    states, metrics = ([column.name for column in store.columns if column.role == role] for role in ("state", "metric"))
+    return ["case_id", "status", *(states or metrics)]
 
 
 def write_csv(store: Store, columns: Sequence[str], out: Path) -> int:

@@ -138,6 +138,8 @@ def test_the_command_line_says_of_simulators_what_is_true_of_them(tmp_path):
     said = CliRunner().invoke(app, ["extend", str(tmp_path / "run"), "--cases", "6", "--no-report"])
     assert said.exit_code == 0
     assert "compile" not in said.output
+    CliRunner().invoke(app, ["export", str(tmp_path / "run"), "--out", str(tmp_path / "ends.csv")])
+    assert [*pd.read_csv(tmp_path / "ends.csv")] == ["case_id", "status", *METRICS]
 
 
 def test_a_run_with_failed_cases_says_why_the_first_of_them_failed(tmp_path):
