@@ -191,6 +191,7 @@ class Worker:
         finally:
             if os.getpid() != self._process:  # a copy by os.fork, whose reply would be taken for that of another case
                 os._exit(1)
+            signal.setitimer(signal.ITIMER_REAL, 0.0)  # an alarm would ring in another case
             end_children(self._before)
             os.fchdir(self._folder)
             for descriptor, (_, _, kept) in self._streams.items():
@@ -358,8 +359,7 @@ def _prepare_process(work: Path, parent: int, memory_mib: float | None, of_progr
     if memory_mib is not None and sys.platform.startswith("linux"):
         import resource
 
-        limit = int(memory_mib * _MIB)
-        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
+        resource.setrlimit(resource.RLIMIT_DATA, (int(memory_mib * _MIB),) * 2)
 
 
 def main(descriptor: int, work: Path, parent: int) -> None:

@@ -222,9 +222,9 @@ def test_the_echo_finds_an_input_that_is_rounded(tmp_path):
 
 def test_what_a_function_does_to_its_process_ends_with_its_case(tmp_path, monkeypatch, sound):
     monkeypatch.chdir(tmp_path)  # the run is named from the folder that the cases leave
-    left = "import os, sys\nprint('flies')\nassert os.path.exists('here')\nif case.id % 2:\n    os.chdir(case.folder)"
-    closed = "print('lost', end='')\n    os.close(1)\n    sys.stderr.close()"
-    fault = f"{left}\n    inputs['height_m'] = -1.0\n    {closed}\n    raise ValueError('odd')"
+    left = "import os, signal, sys, time\nprint('flies', time.sleep(0.2))\nassert os.path.exists('here')"
+    gone = "os.chdir(case.folder); signal.setitimer(0, 0.1); print(end='lost'); os.close(1); sys.stderr.close()"
+    fault = f"{left}\nif case.id % 2:\n    {gone}\n    inputs['height_m'] = -1.0\n    raise ValueError('odd')"
     Path("here").touch()
     table = run(load_campaign(python_campaign(Path("ball"), cases=4, fault=fault)), Path("run"), workers=1).cases()
     refuse_others(table, (1, 3), "crashed", "ValueError: odd")
