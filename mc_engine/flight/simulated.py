@@ -161,7 +161,7 @@ class SimulatorFlyer(Flyer):
                 lines[0] += ", or `replay` finds other bits; where they differ by rounding alone, set deterministic to "
                 lines[0] += "false, and a tolerance"
         still = [name for name in self._names if first[name] == dispersed[name]]
-        moved = self._campaign.first is None  # else case 0 has no inputs yet but the nominal ones
+        moved = any(column[0] != self._campaign.nominal[name] for name, column in table.items())
         if moved and still and dispersed["status"] == first["status"] == STATUS_NAME[OK]:
             lines.append(f"the same in the nominal and in case 0: {', '.join(still)}; does an input move it?")
         if self.simulator.batch:

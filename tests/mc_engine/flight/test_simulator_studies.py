@@ -1,6 +1,7 @@
 """All that a run can be part of, with simulators: shards, clusters, studies, ways to give results, imports."""
 
 import json
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -284,6 +285,16 @@ def test_check_tells_of_declared_outputs_of_which_no_history_comes(tmp_path):
         said = CliRunner().invoke(app, ["check", str(python_campaign(tmp_path / folder, cases=1, fault=lines))])
         assert said.exit_code == 0
         assert (told in said.stdout) == expected
+
+
+@pytest.mark.parametrize("design", ["mc", "one_at_a_time"])
+def test_check_asks_what_moves_a_metric_only_where_case_0_is_not_the_nominal(tmp_path, design):
+    file = python_campaign(tmp_path / "ball", fault="return {'fall_time_s': 1.0, 'impact_speed_m_s': 1.0}")
+    text = re.sub(r"cases = .*\n|seed = .*\n|first = 2", "", file.read_text())
+    file.write_text(text.replace('"mc"', '"mc"\ncases = 4\nseed = 3' if design == "mc" else f'"{design}"'))
+    said = CliRunner().invoke(app, ["check", str(file)])
+    assert said.exit_code == 0
+    assert ("does an input move it?" in said.stdout) == (design == "mc")
 
 
 @pytest.mark.parametrize("times", [1, 2])
