@@ -47,7 +47,8 @@ class SimulatorFlyer(Flyer):
         self.most_workers = self.simulator.slots
         self.tolerance = None if self.simulator.deterministic else self.simulator.tolerance
         self._names = [metric.name for metric in self.simulator.metrics]
-        self._key = (self.simulator.reference, str(campaign.directory), self.digest(), campaign.seed)
+        described = campaign.text if self.simulator.is_described else ""  # its table, which the digest leaves out
+        self._key = (self.simulator.reference, str(campaign.directory), self.digest(), campaign.seed, described)
 
     def fly(
         self,
