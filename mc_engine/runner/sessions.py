@@ -89,6 +89,9 @@ def complete(store: Store, campaign: Campaign, session: Session, repair: bool = 
 def _fly_missing(store: Store, campaign: Campaign, session: Session, repair: bool, stop: threading.Event) -> None:
     if repair:
         withdraw_damaged(store)
+    elif lost := [part.file for part in store.parts if not (store.path / part.file).exists()]:
+        again = f"`mc-engine resume {shell_word(store.path)} --repair` flies its cases again"
+        raise StoreError(f"{store.path / lost[0]}: is gone; {again}")
     tasks, size = _missing_tasks(store, session, flyer_on(session.backend.name, campaign))
     missing = sum(task.stop - task.first for task in tasks)
     store.note("started", backend=session.backend.name, workers=session.workers, chunk=size, missing=missing)

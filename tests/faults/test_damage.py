@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from stones import call, results
+from stones import call, results, stones
 
 from mc_engine import open_store
 from mc_engine.errors import StoreError
 from mc_engine.runner import runner
+from mc_engine.runner.shards import Shard
 from mc_engine.store.verification import damage
 
 RECOMPUTED = ("cases/", "history/", "nominal.parquet")  # what repair can fly again; the rest is told and refused
@@ -140,6 +141,19 @@ def test_a_folder_that_is_gone_is_named_and_made_anew(run, flown, folder):
     assert call("resume", run, "--repair", "--no-report").exit_code == 0
     assert damage(run) == []
     assert results(run) == results(flown.path)
+
+
+def test_a_shard_without_one_of_its_parts_is_no_complete_shard(tmp_path):
+    shard = runner.run(stones(tmp_path / "campaign", 200), tmp_path / "shard", workers=1, shard=Shard(2, 2))
+    lost = shard.path / shard.parts[0].file
+    before = lost.read_bytes()
+    lost.unlink()
+    said = call("resume", shard.path)
+    assert (said.exit_code, said.stdout) == (5, "")
+    assert f"{lost}: is gone; `mc-engine resume {shard.path} --repair`" in said.stderr
+    assert call("resume", shard.path, "--repair").exit_code == 0
+    assert lost.read_bytes() == before
+    assert damage(shard.path) == []
 
 
 THREADS = """
