@@ -34,8 +34,8 @@ from mc_engine.command_line.app import (
     run_here,
     write_reports,
 )
-from mc_engine.command_line.next_step import MERGE, after_flight, is_complete, journal_lines
-from mc_engine.errors import RunInterrupted, UsageError
+from mc_engine.command_line.next_step import MERGE, MERGE_AGAIN, after_flight, is_complete, journal_lines
+from mc_engine.errors import DiskError, RunInterrupted, UsageError
 from mc_engine.interruption import NOTHING_BEGUN, advise, raise_if_signalled
 from mc_engine.shell_words import shell_word
 from mc_engine.status import MOST_CASES
@@ -387,8 +387,11 @@ def merge(
         existing_run(shard)
     refuse_occupied_folder(out, option="")
     advise(lambda: after_flight(out))
-    store = _with_progress(
-        lambda runner, progress: runner.merge(out, shards, progress=progress, workers=workers, chunk=chunk),
-        shards[0],
-    )
+    try:
+        store = _with_progress(
+            lambda runner, progress: runner.merge(out, shards, progress=progress, workers=workers, chunk=chunk),
+            shards[0],
+        )
+    except DiskError as error:
+        raise DiskError(f"{error}; {MERGE_AGAIN.format(shell_word(out))}") from error
     finish(store, no_report)

@@ -10,6 +10,7 @@ from mc_engine.shell_words import shell_word
 from mc_engine.store.run_files import JOURNAL, MANIFEST
 
 MERGE = "`mc-engine merge RUN SHARD...` makes one run of all shards, and its reports"
+MERGE_AGAIN = "remove {0} and run the same `mc-engine merge` again; `mc-engine resume {0}` would fly its cases anew"
 _UNFINISHED = ("created", "started", "rerun", "extended", "part-withdrawn")  # events that `finished` has to follow
 
 
@@ -24,6 +25,8 @@ def after_flight(run: Path, options: str = "", url: str | None = None, rerun: bo
     import json  # not for `--help`
 
     events, manifest = _events(run), json.loads((run / MANIFEST).read_bytes())
+    if "merged" in events and "started" not in events:
+        return f"interrupted; {MERGE_AGAIN.format(shell_word(run))}"
     # a run with interim analyses is complete once it is decided, which `resume` finds out
     if manifest.get("looks") or not _is_finished(events):
         command = "rerun --failed" if rerun and "rerun" in events else "resume"

@@ -177,6 +177,22 @@ def test_a_complete_shard_is_to_be_merged(here):
     assert "extend" not in answer
 
 
+@pytest.mark.parametrize("cause", [KeyboardInterrupt(), DiskError("whole/cases: No space left on device")])
+def test_a_merge_that_breaks_off_is_begun_again_and_not_flown(here, monkeypatch, cause):
+    def breaks_off(*_):
+        raise cause
+
+    shards = ("1", "2")
+    for number in shards:
+        flight = ("run", "minimal", "--cases", "20", "--no-report", "--shard", f"{number}/2", "--out", number)
+        assert call(*flight).exit_code == 0
+    with monkeypatch.context() as patch:
+        patch.setattr("mc_engine.runner.shards._write_part", breaks_off)
+        fails_with(4, call("merge", "whole", *shards), "remove whole and run the same `mc-engine merge` again")
+    shutil.rmtree("whole")
+    assert call("merge", "whole", *shards, "--no-report").exit_code == 0
+
+
 def test_a_creation_that_the_disk_cut_short_is_begun_again_by_the_same_command(here, monkeypatch):
     durably = store.disk.write_inside
 
