@@ -164,12 +164,12 @@ def _shard(text: str | None) -> "Shard | None":
         leave(USAGE, f"--shard {error}")
 
 
-def _refuse_publication(url: str | None) -> None:
-    """End the command if the URL cannot be listed; called before a long flight."""
+def _refuse_publication(url: str | None, run: Path | None = None) -> None:
+    """End the command if the run, None for a new one, cannot be copied to the URL; called before a long flight."""
     if url is not None:
-        from mc_engine.store.object_store import refuse_unreachable
+        from mc_engine.store.object_store import refuse_publication
 
-        refuse_unreachable(url)
+        refuse_publication(url, run)
 
 
 @contextmanager
@@ -279,12 +279,12 @@ def resume(
     """Complete a run that was interrupted."""
     options = _worker_options(folder, workers, backend, scheduler, case_seconds, memory, patience, publish)
     options["repair"] = repair
-    _refuse_publication(publish)
     if repair:
         from mc_engine.store.repair import mend_journal
 
         mend_journal(folder)
     flown = existing_run(folder)
+    _refuse_publication(publish, folder)
     looks = flown.manifest.get("looks")
     if not repair and not looks and is_complete(folder):
         _leave_complete(flown, publish)
@@ -331,8 +331,8 @@ def extend(
     """Add cases to a run. A run of 1000 cases extended to 2000 equals a run of 2000 cases."""
     from mc_engine.sampling.designs import extension_problem
 
-    _refuse_publication(publish)
     store = existing_run(folder)
+    _refuse_publication(publish, folder)
     if sentence := extension_problem(store.manifest, store.n_cases, cases):
         leave(USAGE, f"{folder}: {sentence}")
     options = _worker_options(folder, workers, backend, scheduler, case_seconds, memory, patience, publish)

@@ -191,10 +191,19 @@ def local_copy(place: str | Path) -> Path:
     return fetch(str(place), scratch / str(place).rstrip("/").rpartition("/")[2])
 
 
-def refuse_unreachable(url: str) -> None:
-    """StoreError if `url` cannot be listed; called before a long flight."""
+def refuse_publication(url: str, run: Path | None) -> None:
+    """Refuse a URL to which `run` cannot be copied; called before a long flight.
+
+    run : an existing run directory; None for a run that has not begun
+    StoreError if `url` cannot be listed; UsageError if it holds another run, or a later state of this one.
+    """
     with _reaching(url):
-        _Remote(url)
+        remote = _Remote(url)
+        if (before := remote.journal()) is None:
+            return
+        if run is None:
+            raise UsageError(f"{remote.url}: holds another run; choose another place")
+        _refuse_another_run(run, remote, before, scan(read_journal(run / JOURNAL)), set())
 
 
 def _counted(entries: tuple[Entry, ...]) -> dict[str, str]:

@@ -100,6 +100,28 @@ def test_a_run_that_flies_keeps_its_copy_on_s3_and_a_report_on_it_is_written_the
     assert len(open_store(f"{s3}/flown").cases()) == 80
 
 
+def test_a_copy_that_cannot_be_kept_is_refused_before_a_case_flies(memory, run, tmp_path):
+    stones(tmp_path, 60)
+    publish(run, memory)
+    answer = CliRunner().invoke(
+        app, ["run", f"{tmp_path}/campaign.toml", "--out", f"{tmp_path}/new", "--publish", memory]
+    )
+    assert (answer.exit_code, answer.output) == (2, f"{memory}: holds another run; choose another place\n")
+    assert not (tmp_path / "new").exists()
+    flown = tmp_path / "flown"
+    run_verb("run", tmp_path / "campaign.toml", "--out", flown, "--publish", f"{memory}/flown", "--no-report")
+    earlier = shutil.copytree(flown, tmp_path / "earlier")
+    run_verb("extend", flown, "--cases", 80, "--publish", f"{memory}/flown", "--no-report")
+    before = digests(earlier)
+    for words in (["resume", f"{earlier}"], ["extend", f"{earlier}", "--cases", "90"]):
+        answer = CliRunner().invoke(app, [*words, "--publish", f"{memory}/flown"])
+        assert (answer.exit_code, answer.output) == (
+            2,
+            f"{memory}/flown: holds a later state of this run; fetch that one\n",
+        )
+        assert digests(earlier) == before
+
+
 def run_verb(*words):
     answer = CliRunner().invoke(app, [str(word) for word in words])
     assert answer.exit_code == 0, answer.output
