@@ -151,11 +151,15 @@ def _client(scheduler: Any) -> Iterator[Any]:
         client = Client(scheduler, timeout=START_S, set_as_default=False)
     except Exception as error:  # nobody there, or a protocol that cannot be used
         raise WorkersLost(f"--scheduler {scheduler}: there is no scheduler: {error}") from error
+    log = logging.getLogger("distributed.client")
+    level = log.level
+    log.setLevel(logging.CRITICAL)  # it would print tracebacks where the scheduler is gone, which `WorkersLost` tells
     try:
         yield client
     finally:
         with suppress(TimeoutError):
             client.close(timeout=ANSWER_S)
+        log.setLevel(level)
 
 
 def _threads(client: Any) -> int:

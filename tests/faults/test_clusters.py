@@ -1,5 +1,6 @@
 """Clusters whose workers leave, die beside each other, or never come: the run goes on, or ends and can be resumed."""
 
+import json
 import signal
 import subprocess
 import sys
@@ -87,6 +88,28 @@ def ended(process, within_s):
     assert "Traceback" not in errors
     assert time.monotonic() - begin < within_s
     return errors
+
+
+def test_a_scheduler_that_is_killed_is_told_in_one_sentence(tmp_path):
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
+    file = tmp_path / "scheduler.json"
+    scheduler = subprocess.Popen(
+        [*command, "--no-dashboard", "--scheduler-file", str(file)], stderr=subprocess.DEVNULL, env=ENVIRONMENT
+    )
+    try:
+        deadline = time.monotonic() + LONGEST_S
+        while not file.exists() or not file.read_text():
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        process = waiting(tmp_path, json.loads(file.read_text())["address"])
+        time.sleep(3.0)  # its task lies with the scheduler
+    finally:
+        scheduler.kill()
+        scheduler.wait()
+    *_, told = lines = ended(process, 60.0).splitlines()
+    assert "the scheduler" in told
+    assert "flies the rest" in told
+    assert len(lines) <= 3  # the others are of the preparation
 
 
 def test_one_signal_ends_a_run_that_has_no_worker(tmp_path):
