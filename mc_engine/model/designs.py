@@ -7,7 +7,6 @@ import dataclasses
 import io
 import os
 import platform
-import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -23,8 +22,7 @@ from mc_engine.cache_folder import cache_folder
 from mc_engine.durable_file import make_folder, read_file, write_durably
 from mc_engine.errors import ModelError, StoreError
 from mc_engine.lanes.physics_function import PhysicsFunction
-from mc_engine.model.imports import USER
-from mc_engine.model.sources import sources_beside, sources_of_module
+from mc_engine.model.sources import made_of
 
 _ENGINE = Path(__file__).parents[1]
 _DIGEST_BYTES = 32
@@ -34,7 +32,7 @@ _one_at_a_time = threading.RLock()  # a design may ask for another
 def kept_design(design: Callable[..., np.ndarray], *inputs: Any) -> np.ndarray:
     """The array that `design(*inputs)` returns, from the cache if it was computed before with the same inputs.
 
-    design : function of a module; its result must depend on the inputs and the sources alone
+    design : function of a module; its result must depend on the inputs, the sources and the model's data files alone
     inputs : numbers, texts, None, arrays of numbers; tuples, lists, dictionaries, named tuples, dataclasses and
         `SimpleNamespace` of them
 
@@ -43,8 +41,9 @@ def kept_design(design: Callable[..., np.ndarray], *inputs: Any) -> np.ndarray:
     One design is computed at a time.  A design may call `kept_design`, but not in threads that it waits for.
 
     A design is computed again after a change of its inputs, of a source in the folder of `design` or imported from
-    there, of the engine's physics, of NumPy or SciPy, or of the processor, and if its file is damaged.  If the cache
-    cannot be written, the result is the same, but each call computes it anew.
+    there, of a data file or curve that such a source names, of the engine's physics, of NumPy or SciPy, or of the
+    processor, and if its file is damaged.  If the cache cannot be written, the result is the same, but each call
+    computes it anew.
 
     Raises TypeError for inputs of other types, which cannot be compared with those of a kept design.
 
@@ -135,14 +134,12 @@ def designing() -> Iterator[None]:
 
 
 def _sources(module: str) -> str:
-    """SHA-256 over the sources of a module, as it was imported, and over the engine's physics."""
-    file = Path(str(sys.modules[module].__file__))
-    files = sources_beside(file) if module.startswith(USER) else sources_of_module(module, file.parent).files
+    """SHA-256 over the sources and data of a module, as they were imported, and over the engine's physics."""
+    engine = [*_ENGINE.glob("lanes/*.py"), *_ENGINE.glob("physics/*.py")]
+    files = [*made_of(module), *((path.name, path.read_bytes()) for path in engine)]
     digest = sha256()
-    for path in [*_ENGINE.glob("lanes/*.py"), *_ENGINE.glob("physics/*.py")]:
-        files = {**files, path: path.read_bytes()}
-    for content in sorted(sha256(content).digest() for content in files.values()):
-        digest.update(content)
+    for item in sorted(f"{name} {sha256(content).hexdigest()} " for name, content in files):
+        digest.update(item.encode())
     return digest.hexdigest()
 
 

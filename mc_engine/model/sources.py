@@ -38,10 +38,7 @@ class Sources:
 
     def named(self) -> Iterator[tuple[str, bytes]]:
         """Names, such as "lib/guidance.py", and contents in a fixed order."""
-        contents = {**self.files, **self.data}
-        for path in sorted(contents):
-            name = path.relative_to(self.home).as_posix() if path.is_relative_to(self.home) else path.name
-            yield name, contents[path]
+        yield from _named({**self.files, **self.data}, self.home)
 
     def with_data(self, names: Sequence[str], read: Iterable[Path] = ()) -> "Sources":
         """The same with the data of the model itself; ModelError for a name that is wrong.
@@ -70,6 +67,7 @@ class Sources:
 
 
 _OF_FILES: dict[str, Sources] = {}  # by the name of the module
+_NAMED: dict[str, list[tuple[str, bytes]]] = {}  # sources and data of a user's file, by the mark in that name
 
 
 def sources_of_file(path: Path) -> Sources:
@@ -83,10 +81,23 @@ def sources_of_file(path: Path) -> Sources:
     mark = sha256(str(path).encode() + b"".join(texts)).hexdigest()[:12]
     name = f"{USER}{path.stem}_{mark}"
     if name not in _OF_FILES:
+        _NAMED[mark] = list(_named({**files, **data}, path.parent))
         with importable(path.parent, mark, files):
             module = new_module(name, path, files[path])
         _OF_FILES[name] = Sources(module, path.parent, path.parent, files, data)
     return _OF_FILES[name]
+
+
+def made_of(module: str) -> list[tuple[str, bytes]]:
+    """Names and contents of the sources and data of a loaded module and its package or folder, as they were read."""
+    if module.startswith(USER):
+        return _NAMED[module.rpartition("_")[2]]
+    return list(sources_of_module(module, Path(str(sys.modules[module].__file__)).parent).named())
+
+
+def _named(contents: Mapping[Path, bytes], home: Path) -> Iterator[tuple[str, bytes]]:
+    for path in sorted(contents):
+        yield path.relative_to(home).as_posix() if path.is_relative_to(home) else path.name, contents[path]
 
 
 _STUB = """from pathlib import Path
@@ -180,6 +191,8 @@ def sources_of_module(name: str, folder: Path) -> Sources:
                 seen.add(reached)
                 waiting.append(reached)
                 contents[Path(str(sys.modules[reached].__file__))] = _text_of_module(reached)
+    for file, source in contents.items():
+        data = {**_files_named(data_names(source), file.parent), **data}
     data = {**_curves_beside(contents), **data}
     base = home.parents[name.count(".") + (home.name == "__init__.py")]
     return Sources(module, base, folder, contents, data)

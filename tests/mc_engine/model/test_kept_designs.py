@@ -124,13 +124,25 @@ def test_a_cache_that_cannot_be_written_costs_nothing_but_time(folder):
     assert len(calls) == 2
 
 
-@pytest.mark.parametrize("changed", ["model.py", "gains.py"])
-def test_a_changed_source_of_the_model_is_another_design(folder, tmp_path, changed):
+@pytest.mark.parametrize(
+    ("changed", "more"), [("model.py", "NEW = 1"), ("gains.py", "NEW = 1"), ("k.csv", "9,9"), (0, 0)]
+)
+def test_a_changed_source_of_the_model_is_another_design(folder, tmp_path, changed, more):
     minimal = (SHIPPED / "minimal" / "model.py").read_text()
-    (tmp_path / "model.py").write_text(f"{minimal}\nfrom gains import gains\n")
-    (tmp_path / "gains.py").write_text("import numpy as np\n\n\ndef gains(k):\n    return np.array([k])\n")
-    for text, count in (("", 1), ("", 1), ("\nK = 1\n", 2)):
-        (tmp_path / changed).write_text((tmp_path / changed).read_text() + text)
+    curves = "K, L = curve('k.csv', y_unit='m'), curve('l.csv', y_unit='m')"
+    gains = f"import numpy as np\nfrom mc_engine.physics.curves import curve\n{curves}\n"
+    gains += "def gains(k):\n    return np.array([K(k) - L(k)])\n"
+    files = {"k.csv": "x,y\n0,1\n5,1\n", "l.csv": "x,y\n0,2\n5,2\n"}
+    files |= {"model.py": f"{minimal}\nfrom gains import gains\n", "gains.py": gains}
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    edited = {changed: f"{files[changed]}{more}\n"} if changed else {"k.csv": files["l.csv"], "l.csv": files["k.csv"]}
+    for edit, count in (({}, 1), ({}, 1), (edited, 2)):
+        loaded = load_model("model.py", tmp_path).sources.module.gains
+        for name, text in edit.items():
+            (tmp_path / name).write_text(text)
+        kept_design(loaded, 4.0)  # of the sources as they were loaded, whatever the files say since
+        assert len(list(folder.iterdir())) == 1
         kept_design(load_model("model.py", tmp_path).sources.module.gains, 4.0)
         assert len(list(folder.iterdir())) == count
 
