@@ -143,6 +143,12 @@ class _Packages(MetaPathFinder):
             known[file] = file.read_bytes()
         return known[file]
 
+    def data(self, root: str, contents: Mapping[Path, bytes], was_loaded: bool) -> dict[Path, bytes]:
+        """These contents of a model's data; where it was loaded before and a file was given, the content then."""
+        known = self.contents.setdefault(root, {})
+        known |= {file: content for file, content in contents.items() if not (was_loaded and file in known)}
+        return {file: known[file] for file in contents}
+
     @contextmanager
     def loading(self, root: str) -> Iterator[None]:
         """Within, a model of package `root` is imported, with physics from wherever it comes."""

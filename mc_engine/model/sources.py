@@ -62,7 +62,8 @@ class Sources:
                 raise ModelError(f'write "{path.name}" into the call of `curve` or `surface` itself, not as a variable')
         for path, name in paths.items():
             if _content(path) != self.data.get(path):
-                raise ModelError(f'data: "{name}" was changed while the model was loaded; begin again')
+                changed = f'data: "{name}" was changed while the model was loaded'
+                raise ModelError(f"{changed}; begin again in a new Python process")
         return replace(self, data={path: self.data[path] for path in paths})
 
 
@@ -176,7 +177,7 @@ def sources_of_module(name: str, folder: Path) -> Sources:
     What a program has imported before, by itself, counts as what its files say now.
     """
     root = name.partition(".")[0]
-    data = _data_in(folder, _contents(folder.glob("*.py")))
+    data, was_loaded = _data_in(folder, _contents(folder.glob("*.py"))), name in sys.modules
     with PACKAGES.loading(root):
         module = import_module(name)
     assert module.__file__ is not None  # a model's module always comes from a file
@@ -193,7 +194,7 @@ def sources_of_module(name: str, folder: Path) -> Sources:
                 contents[Path(str(sys.modules[reached].__file__))] = _text_of_module(reached)
     for file, source in contents.items():
         data = {**_files_named(data_names(source), file.parent), **data}
-    data = {**_curves_beside(contents), **data}
+    data = PACKAGES.data(root, {**_curves_beside(contents), **data}, was_loaded)
     base = home.parents[name.count(".") + (home.name == "__init__.py")]
     return Sources(module, base, folder, contents, data)
 

@@ -214,6 +214,9 @@ def test_data_of_an_installed_model_count_as_its_source(tmp_path, monkeypatch):
         assert model.rhs.function.__globals__["MU"] == float(number)
         digests.add(source_digest(model, None))
     assert len(digests) == 2
+    (tmp_path / "pkg_data" / "factors.csv").write_text("4.1e14,0.0\n")  # the module in memory has the numbers of before
+    with pytest.raises(CampaignError, match=r'"factors.csv" was changed .* begin again in a new Python process'):
+        load_campaign(tmp_path / "campaign.toml")
 
 
 @pytest.mark.parametrize("other", ["pipe", "folder", "lost link", "deep", "signs"])
