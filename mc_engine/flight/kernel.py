@@ -114,7 +114,8 @@ def source_digest(model: Model, folder: Path | None) -> str:
     digest = sha256()
     for path in files:
         digest.update(f"{path.name}\n".encode() + path.read_bytes())
-    for name, content in sources_of(model, folder).named():
+    sources = sources_of(model, folder)
+    for name, content in (*sources.named(), *sources.elsewhere.items()):
         digest.update(f"{name}\n{len(content)}\n".encode() + content)
     return digest.hexdigest()
 

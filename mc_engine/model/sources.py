@@ -7,7 +7,7 @@ kept in the run directory.
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
@@ -28,6 +28,7 @@ class Sources:
 
     home : folder that the names of the files begin in.  folder : the model's own.  data : contents of the files that
     model(..., data=...) names and of those that curves are read from, as they were before the import.
+    elsewhere : texts of the modules with physics that a user's file imports from other folders, by their names.
     """
 
     module: ModuleType
@@ -35,6 +36,7 @@ class Sources:
     folder: Path
     files: Mapping[Path, bytes]
     data: Mapping[Path, bytes]
+    elsewhere: Mapping[str, bytes] = field(default_factory=dict)
 
     def named(self) -> Iterator[tuple[str, bytes]]:
         """Names, such as "lib/guidance.py", and contents in a fixed order."""
@@ -85,7 +87,9 @@ def sources_of_file(path: Path) -> Sources:
         _NAMED[mark] = list(_named({**files, **data}, path.parent))
         with importable(path.parent, mark, files):
             module = new_module(name, path, files[path])
-        _OF_FILES[name] = Sources(module, path.parent, path.parent, files, data)
+            own = [known for known in sys.modules if known.startswith(USER) and known.endswith(f"_{mark}")]
+            elsewhere = {known: text for known, text in _deciding(own).items() if _file_of(known) not in files}
+        _OF_FILES[name] = Sources(module, path.parent, path.parent, files, data, elsewhere)
     return _OF_FILES[name]
 
 
@@ -185,13 +189,7 @@ def sources_of_module(name: str, folder: Path) -> Sources:
     inside_package = home.name == "__init__.py" or "." in name
     beside = home.parent.rglob("*.py") if inside_package else home.parent.glob("*.py")
     contents = {path: PACKAGES.read(root, path) for path in beside if path.is_file()}
-    waiting, seen = [name], {name}
-    while waiting:
-        for reached in _modules_imported_by(waiting.pop()):
-            if reached not in seen and _decides(reached, name):
-                seen.add(reached)
-                waiting.append(reached)
-                contents[Path(str(sys.modules[reached].__file__))] = _text_of_module(reached)
+    contents |= {_file_of(reached): text for reached, text in _deciding([name]).items()}
     for file, source in contents.items():
         data = {**_files_named(data_names(source), file.parent), **data}
     data = PACKAGES.data(root, {**_curves_beside(contents), **data}, was_loaded)
@@ -215,9 +213,26 @@ def _text_of_module(name: str) -> bytes:
     return PACKAGES.read(name.partition(".")[0], Path(str(module.__file__)))
 
 
-def _decides(name: str, model: str) -> bool:
-    """Whether a module may decide the model's numbers: of the same package, or with physics in it."""
+def _deciding(models: list[str]) -> dict[str, bytes]:
+    """Texts of the modules that may decide the numbers of loaded ones, which import them at first or second hand."""
+    waiting, seen, texts = [*models], {*models}, dict[str, bytes]()
+    while waiting:
+        importing = waiting.pop()
+        for reached in _modules_imported_by(importing):
+            if reached not in seen and _decides(reached, importing):
+                seen.add(reached)
+                waiting.append(reached)
+                texts[reached] = _text_of_module(reached)
+    return dict(sorted(texts.items()))
+
+
+def _file_of(name: str) -> Path:
+    return Path(str(sys.modules[name].__file__))
+
+
+def _decides(name: str, importing: str) -> bool:
+    """Whether a module may decide the numbers of one that imports it: of the same package, or with physics in it."""
     module, root = sys.modules[name], name.split(".")[0]
     if root == _ENGINE or not str(getattr(module, "__file__", None)).endswith(".py"):
         return False
-    return root == model.split(".")[0] or any(isinstance(value, PhysicsFunction) for value in vars(module).values())
+    return root == importing.split(".")[0] or any(isinstance(value, PhysicsFunction) for value in vars(module).values())

@@ -12,6 +12,7 @@ from mc_engine.errors import CampaignError, StoreError
 from mc_engine.flight.kernel import source_digest
 from mc_engine.runner.flown_campaign import companions_of
 from mc_engine.runner.runner import extend, replay, run
+from mc_engine.store.opening import open_store
 from mc_engine.store.verification import damage
 from tests.mc_engine.command_line.cart import call
 from tests.mc_engine.store.small_run import ENVIRONMENT
@@ -108,6 +109,34 @@ def test_the_sources_of_an_installed_model_are_all_that_it_reaches_in_its_packag
         (tmp_path / "pkg_beside" / "constants.py").write_text("MU = 1.0\n")
         assert source_digest(model, None) == digests[-1]  # of what was imported
     assert len(set(digests)) == 2
+
+
+ELSEWHERE = """from mc_engine.lanes import physics
+from laws.numbers import Law
+
+
+@physics
+def pull(r2):
+    return (-1.3e-6 if Law.SQUARE == 1 else -1.2e-6) + 0.0 * r2
+"""
+
+
+def test_physics_that_a_file_imports_from_another_folder_count_as_its_source(tmp_path, monkeypatch):
+    folder = campaign_in(tmp_path / "mine", {}, "from laws.pull import pull")
+    monkeypatch.setitem(ENVIRONMENT, "PYTHONPATH", f"{ENVIRONMENT['PYTHONPATH']}{os.pathsep}{tmp_path / 'lib'}")
+    times = []
+    for number in (1, 2):
+        law = f"from enum import IntEnum\n\n\nclass Law(IntEnum):\n    SQUARE = {number}\n"
+        files = {"__init__.py": "", "pull.py": ELSEWHERE, "numbers.py": law}
+        for name, text in files.items():
+            (tmp_path / "lib" / "laws" / name).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / "lib" / "laws" / name).write_text(text)
+        done = said(folder, "run", ".", "--out", f"run{number}", "--cases", "2", "--no-report")
+        assert done.returncode == 0, done.stderr
+        times.append(open_store(folder / f"run{number}").cases()["apogee_time_s"][0])
+    assert times[1] != times[0]  # a kernel that an enumeration is in is named by the sources
+    refused = said(folder, "extend", "run1", "--cases", "4")
+    assert "was flown by other sources of engine or model" in refused.stderr
 
 
 AERO = """import numpy as np
