@@ -16,7 +16,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -34,7 +34,7 @@ from mc_engine.store.parts import PART_FOLDERS, is_part_file
 from mc_engine.store.receipts import receipts_of
 from mc_engine.store.run_files import CAMPAIGN, JOURNAL, MANIFEST, SENSITIVITY, is_run_directory, path_of
 from mc_engine.store.urls import ON_DISK, is_url, store_url
-from mc_engine.store.writer_lock import LOCK_FILES, WriterLock
+from mc_engine.store.writer_lock import LOCK_FILES, LOCK_NAME, WriterLock
 
 _INNER = f"{SENSITIVITY}/{JOURNAL}"  # of the flights for sensitivities, a run directory inside the run
 AT_ONCE = 8  # files that are sent or read at a time: a store answers many requests in the time of one
@@ -125,16 +125,18 @@ def fetch(url: str, folder: Path) -> Path:
 
 @contextmanager
 def _scratch(folder: Path) -> Iterator[Path]:
-    """A temporary folder next to `folder`; those that killed processes left there are removed."""
+    """A temporary folder next to `folder`; those of this user that killed processes left there are removed."""
     prefix, suffix = f".{folder.name}.", ".tmp"
     make_folder(folder.parent)
     with disk_errors(folder):
-        others = [path for path in folder.parent.iterdir() if path.name.startswith(prefix) and path.suffix == suffix]
+        alike = [path for path in folder.parent.iterdir() if path.name.startswith(prefix) and path.suffix == suffix]
         own = Path(tempfile.mkdtemp(prefix=prefix, suffix=suffix, dir=folder.parent))
-    for other in others:
-        with suppress(StoreError), _locked(other):  # refused if its process is still running
-            pass
     with _locked(own):
+        for other in alike:
+            with suppress(OSError, StoreError):  # refused if its process is still running
+                if other.lstat().st_uid == own.stat().st_uid and (other / LOCK_NAME).exists():  # else it just begins
+                    with _locked(other):
+                        pass
         yield own / "run"
 
 
@@ -181,13 +183,22 @@ def _copy(url: str, folder: Path) -> None:
             make_folder(run / part_folder)  # an object store has no empty folders
 
 
+_copies: list[Path] = []  # the folder of this process for them
+
+
 def local_copy(place: str | Path) -> Path:
-    """The directory `place`; for a URL, a copy that is removed when this process ends."""
+    """The directory `place`; for a URL, a copy that is removed when this process ends.
+
+    If it is killed, the next process that makes one removes it.
+    """
     path = path_of(place, "a run is opened by its path or URL, and {} is neither")
     if not is_url(place):
         return path
-    scratch = Path(tempfile.mkdtemp(prefix="mc-engine-"))
-    atexit.register(shutil.rmtree, scratch, ignore_errors=True)
+    if not _copies or not _copies[-1].is_dir():
+        until_the_end = ExitStack()
+        atexit.register(until_the_end.close)
+        _copies.append(until_the_end.enter_context(_scratch(Path(tempfile.gettempdir()) / "mc-engine")).parent)
+    scratch = Path(tempfile.mkdtemp(dir=_copies[-1]))
     return fetch(str(place), scratch / str(place).rstrip("/").rpartition("/")[2])
 
 

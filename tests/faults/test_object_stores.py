@@ -3,6 +3,8 @@
 import hashlib
 import logging
 import shutil
+import subprocess
+import sys
 import threading
 import time
 from functools import partial
@@ -18,7 +20,7 @@ from mc_engine.store.derived_files import derived_files
 from mc_engine.store.object_store import Publisher, _Remote, fetch, publish
 from mc_engine.store.opening import open_store
 from mc_engine.store.verification import damage
-from tests.mc_engine.store.small_run import block, created, filled
+from tests.mc_engine.store.small_run import ENVIRONMENT, block, created, filled
 
 fsspec = pytest.importorskip("fsspec")
 
@@ -151,6 +153,27 @@ def copied(url):
         return len(open_store(url).cases())
     except StoreError:
         return 0
+
+
+def test_the_copy_of_a_reader_that_is_killed_is_removed_by_the_next_reader(run, tmp_path):
+    publish(run, url := f"file://{tmp_path}/there")
+    (copies := tmp_path / "temporary").mkdir()
+    code = f"from mc_engine import open_store\nopen_store({url!r})\nprint('read', flush=True)\ninput()"
+
+    def reader():
+        command, pipe = [sys.executable, "-c", code], subprocess.PIPE
+        begun = subprocess.Popen(command, stdin=pipe, stdout=pipe, env={**ENVIRONMENT, "TMPDIR": str(copies)})
+        assert begun.stdout.readline() == b"read\n"
+        return begun
+
+    killed, reading = reader(), reader()
+    killed.kill()
+    killed.communicate()
+    assert len(list(copies.iterdir())) == 2
+    reader().communicate(b"\n")
+    assert len(list(copies.rglob("journal.jsonl"))) == len(list(copies.iterdir())) == 1  # of the one that still reads
+    reading.communicate(b"\n")
+    assert not list(copies.iterdir())
 
 
 def test_a_bucket_that_is_not_there_is_a_sentence_and_damage(s3, run):
