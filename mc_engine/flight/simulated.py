@@ -21,6 +21,7 @@ from mc_engine.model.fields import Setting, inputs_of
 from mc_engine.model.record import Refusals
 from mc_engine.model.simulator import Simulator
 from mc_engine.numbers_in_text import counted
+from mc_engine.safe_path import safe_environment
 from mc_engine.status import NOT_FINITE, OK, REFUSED, STATUS_NAME
 from mc_engine.store.case_rows import Row, RowLog
 
@@ -48,7 +49,8 @@ class SimulatorFlyer(Flyer):
         self.tolerance = None if self.simulator.deterministic else self.simulator.tolerance
         self._names = [metric.name for metric in self.simulator.metrics]
         described = campaign.text if self.simulator.is_described else ""  # its table, which the digest leaves out
-        self._key = (self.simulator.reference, str(campaign.directory), self.digest(), campaign.seed, described)
+        around = frozenset(safe_environment().items())  # a process keeps the environment that it was started in
+        self._key = (self.simulator.reference, str(campaign.directory), self.digest(), campaign.seed, described, around)
 
     def fly(
         self,

@@ -297,18 +297,20 @@ def test_check_asks_what_moves_a_metric_only_where_case_0_is_not_the_nominal(tmp
     assert ("does an input move it?" in said.stdout) == (design == "mc")
 
 
-def test_a_process_that_waits_flies_no_campaign_whose_table_has_changed(tmp_path):
+def test_a_process_that_waits_flies_no_campaign_whose_table_or_environment_has_changed(tmp_path, monkeypatch):
     text = """
 [campaign]
 cases = 2
 design = "mc"
 seed = 3
 [simulator]
-command = ["echo", "t=1", "t=2"]
+command = ["sh", "-c", "echo t=1 t=$FALL"]
 [simulator.metric]
 fall_time_s = { pattern = "t=(.)$" }
 """
-    for place, (old, new, found) in enumerate((("", "", 2.0), ("t=2", "t=7", 7.0), ("t=(.)$", "^t=(.)", 1.0))):
+    changes = [("", "", 2.0), ("", "", 4.0), ("t=$FALL", "t=7", 7.0), ("t=(.)$", "^t=(.)", 1.0)]
+    for place, (old, new, found) in enumerate(changes):
+        monkeypatch.setenv("FALL", f"{found:.0f}")
         campaign = load_campaign("echo", text=text.replace(old, new), directory=tmp_path)
         assert set(run(campaign, tmp_path / f"run-{place}", workers=1).cases()["fall_time_s"]) == {found}
 
