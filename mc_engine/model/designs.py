@@ -55,7 +55,7 @@ def kept_design(design: Callable[..., np.ndarray], *inputs: Any) -> np.ndarray:
     path = cache_folder() / "designs" / f"{design.__name__}_{key.hexdigest()[:32]}.npy"
     with suppress(StoreError, ValueError):
         kept = read_file(path)
-        if kept[:_DIGEST_BYTES] == sha256(kept[_DIGEST_BYTES:]).digest():
+        if kept[:_DIGEST_BYTES] == _digest(path, kept[_DIGEST_BYTES:]):
             return np.asarray(np.load(io.BytesIO(kept[_DIGEST_BYTES:]), allow_pickle=False))
     with designing():
         designed = design(*inputs)
@@ -64,8 +64,13 @@ def kept_design(design: Callable[..., np.ndarray], *inputs: Any) -> np.ndarray:
         content = file.getvalue()
     with suppress(StoreError):
         make_folder(path.parent)
-        write_durably(path, sha256(content).digest() + content)
+        write_durably(path, _digest(path, content) + content)
     return designed
+
+
+def _digest(path: Path, content: bytes) -> bytes:
+    """Of a file of the cache, which is no sound one in the place of another."""
+    return sha256(path.name.encode() + content).digest()
 
 
 def compiled_loop(function: Callable[..., None]) -> Callable[..., None]:

@@ -5,6 +5,8 @@ import random
 import pytest
 from falling import engine, falling, table
 
+from mc_engine.lanes.kernel_cache import kept_or_made
+
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
@@ -41,6 +43,17 @@ def test_a_flipped_bit_in_a_compiled_kernel_or_in_its_source_changes_no_number(f
     (source,) = [path for path in flown[2] if path.suffix == ".py"]
     (kernel,) = [path for path in flown[2] if path.suffix == ".kernel" and path.parent == source.parent]
     flies_the_same_after(flown, "few", [(kernel, len(flown[2][kernel]) // 2, 3), (source, 700, 7)])
+
+
+def test_a_kernel_in_the_place_of_another_is_compiled_anew(tmp_path):
+    """All kernels of a processor and a width have the same file name, each in its own folder."""
+    paths = [tmp_path / name / "kernel_w16.0123.kernel" for name in ("first", "second")]
+    contents = [kept_or_made(path, path.parent.name.encode)[0] for path in paths]
+    paths[0].write_bytes(paths[1].read_bytes())
+    assert [kept_or_made(path, path.parent.name.encode) for path in paths] == [
+        (contents[0], True),
+        (contents[1], False),
+    ]
 
 
 @pytest.mark.slow

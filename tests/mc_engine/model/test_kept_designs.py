@@ -106,14 +106,24 @@ def test_what_could_hold_anything_is_no_input(folder):
         kept_design(nothing, doubled)
 
 
-@pytest.mark.parametrize("damage", [lambda old: b"", lambda old: old[:50], lambda old: old[:-1] + bytes([old[-1] ^ 1])])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda old, _: b"",
+        lambda old, _: old[:50],
+        lambda old, _: old[:-1] + bytes([old[-1] ^ 1]),
+        lambda _, other: other,
+    ],
+)
 def test_a_damaged_file_is_designed_again(folder, damage):
     first = kept_design(doubled, INPUTS)
     (file,) = folder.iterdir()
-    file.write_bytes(damage(file.read_bytes()))
+    kept_design(doubled, 3.0 * INPUTS)
+    (other,) = {*folder.iterdir()} - {file}
+    file.write_bytes(damage(file.read_bytes(), other.read_bytes()))
     for _ in range(2):
         assert kept_design(doubled, INPUTS).tobytes() == first.tobytes()
-    assert len(calls) == 2
+    assert len(calls) == 3
 
 
 def test_a_cache_that_cannot_be_written_costs_nothing_but_time(folder):
