@@ -95,7 +95,7 @@ def watch_campaign(reference: str, folder: Path | None, context: typer.Context) 
     advise(lambda: f"no longer watched; the latest results stay in {page.path}")
     typer.echo(f"page         {page.path}")
     typer.echo(f"watching     {file} and the files beside it and its model; Ctrl-C ends it")
-    seen: dict[Path, tuple[int, int]] = {}
+    seen: dict[Path, tuple[int, ...]] = {}
     while True:
         while seen == (now := _stamps(file)):
             time.sleep(_LOOK_EVERY_S)
@@ -110,7 +110,7 @@ def _options_given(context: typer.Context) -> dict[str, str]:
     return {name: str(value) for name, (value, usual) in given.items() if value != usual and name not in own}
 
 
-def _fly_once(file: Path, arguments: Sequence[str], page: "_Page", seen: dict[Path, tuple[int, int]]) -> None:
+def _fly_once(file: Path, arguments: Sequence[str], page: "_Page", seen: dict[Path, tuple[int, ...]]) -> None:
     """Fly once and show the result; given up if a file is saved before the flight has ended."""
     begun = time.monotonic()
     with TemporaryDirectory(prefix="mc-engine-watch-") as place:
@@ -136,7 +136,7 @@ def _fly_once(file: Path, arguments: Sequence[str], page: "_Page", seen: dict[Pa
         page.show(run, f"{clock}, {flown}")
 
 
-def _outcome(flight: "subprocess.Popen[str]", file: Path, seen: dict[Path, tuple[int, int]]) -> tuple[str, str] | None:
+def _outcome(flight: "subprocess.Popen[str]", file: Path, seen: dict[Path, tuple[int, ...]]) -> tuple[str, str] | None:
     """What a flight wrote to its outputs, without its notes on progress; None if a file was saved meanwhile."""
     while True:
         with suppress(subprocess.TimeoutExpired):
@@ -156,14 +156,17 @@ def _end(flight: "subprocess.Popen[str]") -> None:
             flight.communicate()
 
 
-def _stamps(file: Path) -> dict[Path, tuple[int, int]]:
-    """Time of the last change [ns] and size of every file on which the results may depend, by path."""
-    stamps: dict[Path, tuple[int, int]] = {}
+def _stamps(file: Path) -> dict[Path, tuple[int, ...]]:
+    """Times of the last change [ns], size and number of every file on which the results may depend, by path.
+
+    A copy that keeps its time, and a link to another file, change the other time or the number.
+    """
+    stamps: dict[Path, tuple[int, ...]] = {}
     for folder in _folders(file):
         for path in _files_in(folder):
             with suppress(OSError):  # removed since it was listed
                 facts = path.stat()
-                stamps[path] = facts.st_mtime_ns, facts.st_size
+                stamps[path] = facts.st_mtime_ns, facts.st_ctime_ns, facts.st_size, facts.st_ino
             if len(stamps) >= _MOST_FILES:
                 return stamps
     return stamps

@@ -1,6 +1,7 @@
 """`mc-engine run --watch`: flown again on every saved change, mistakes told on the page, until Ctrl-C."""
 
 import json
+import os
 import re
 import signal
 import subprocess
@@ -10,6 +11,7 @@ from contextlib import contextmanager
 
 import pytest
 
+from mc_engine.command_line.watching import _stamps
 from tests.mc_engine.model.mistaken_campaign import write_campaign
 from tests.mc_engine.store.small_run import ENVIRONMENT
 
@@ -77,6 +79,15 @@ def test_every_saved_change_is_flown_and_a_mistake_is_told_above_the_results_bef
     assert "model.py, line 30" in complaint
     assert out.count("flown in") == 3
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "page"]  # no run is kept
+
+
+def test_a_file_of_the_same_time_and_size_in_the_place_of_another_is_a_saved_change(tmp_path):
+    folder = write_campaign(tmp_path / "mine")
+    before, old, other = _stamps(folder / "campaign.toml"), folder / "model.py", tmp_path / "other.py"
+    other.write_text(old.read_text().replace("10_000", "20_000"))
+    os.utime(other, ns=(old.stat().st_atime_ns, old.stat().st_mtime_ns))  # as `rsync --times` and `tar` do
+    other.replace(old)
+    assert _stamps(folder / "campaign.toml") != before
 
 
 def test_what_only_a_kept_run_can_have_is_refused(tmp_path):
