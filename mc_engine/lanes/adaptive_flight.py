@@ -257,11 +257,11 @@ def _fly(
     k, values = unset(slope, f, zero, s, m, p, o), unset(watch, f, zero, s, m, p, o)
     here = Instant(zero, s, m, k, values, values, values)
     atol = scalars_like(here.s, atol)
-    kinds, signs = f.kinds_of(here.values), f.signs_of(here.values)
+    kinds, signs, unknown = f.kinds_of(here.values), f.signs_of(here.values), map_fields(_nothing, here.values)
     new, altered = zero == zero, zero > 0.0  # lanes that begin a case, lanes that the model has changed
     active, status, attempts, sample, limit = zero + 1.0, zero, zero, zero + 1.0, zero + clock.longest
     h, last_ideal = zero, zero + _NONE  # of the step before this one: there is none
-    closing, beyond, armed = zero > 0.0, here, map_fields(_nothing, here.values)
+    closing, beyond, armed = zero > 0.0, here, unknown
     bracket = Bracket(zero, zero, armed, armed, armed, armed, zero, zero, zero, zero)
     best, when = here.values, map_fields(first_time, here.values, zero)
     due, rows_of_step = zero, load(pace, 0, width)
@@ -272,7 +272,7 @@ def _fly(
             if any_lane(new):
                 s, m = begin(f, p, o, key, case)
                 t, s, m = where(new, 0.0, here.t), select(new, s, here.s), select(new, m, here.m)
-                here = Instant(t, s, m, here.k, here.senses, here.rates, here.values)
+                here = Instant(t, s, m, here.k, select(new, unknown, here.senses), here.rates, here.values)
                 status, attempts = where(new, 0.0, status), where(new, 0.0, attempts)
                 sample, limit = where(new, 1.0, sample), where(new, clock.longest, limit)
                 last_ideal = where(new, _NONE, last_ideal)
@@ -295,7 +295,7 @@ def _fly(
             end, k, error = leap(f, tables, trial, here, p, o, atol, clock.rtol)
             t_end = where(landing, target, here.t + trial)
         # the largest part of many kernels: starts and steps share it, so that it is compiled once
-        there = sense(f, t_end, end, here.m, k, p, o, _REACH * h)
+        there = sense(f, t_end, end, k, here, p, o, _REACH * h)
         if starting:
             here = select(new | altered, there, here)
             when = map_fields(jump_time, kinds, when, best, here.values, here.t, altered)

@@ -131,9 +131,14 @@ def _rate(kind, value, ahead, behind, inverse):
 
 
 @physics
-def _sense_of(kind, value, rate):
-    """Rate of a peak, else the value; on zero, where an event has just ended a step, the side it is going to."""
-    return where(kind == PEAK, rate, where(value == 0.0, 1e-30 * rate, value))
+def _sense_of(kind, value, rate, sense_before, rate_before, value_before, later, reach):
+    """Rate of a peak, else the value; on zero, where an event has just ended a step, the side it is going to.
+
+    What has left zero, and hardly `later` [s] is on the other side but still going as it did, is there by rounding.
+    """
+    same = (later < reach) & ((later > 0.0) | (value == value_before))  # else the model has changed the state
+    rounded = same & (value * rate < 0.0) & (sense_before * rate > 0.0) & (rate_before * rate > 0.0)
+    return where(kind == PEAK, rate, where((value == 0.0) | rounded, 1e-30 * rate, value))
 
 
 @physics
@@ -202,17 +207,20 @@ def _watch(f, t, s, m, p, o):
 watch = compile_inline(_watch)
 
 
-def _sense(f, t, s, m, k, p, o, reach):
-    """The `Instant` at a state and its derivative.
+def _sense(f, t, s, k, here, p, o, reach):
+    """The `Instant` at a state and its derivative, after `here` or at the same time.
 
     Rates along the flight are differences over the tangent; central ones are exact up to the square of `reach` [s].
     """
+    m = here.m
     values = watch(f, t, s, m, p, o)
     kinds = f.kinds_of(values)
     ahead = watch(f, t + reach, add_scaled(s, reach, k), m, p, o)
     behind = watch(f, t - reach, add_scaled(s, -reach, k), m, p, o)
     rates = map_fields(_rate, kinds, values, ahead, behind, 1.0 / reach)
-    return Instant(t, s, m, k, map_fields(_sense_of, kinds, values, rates), rates, values)
+    later = t - here.t
+    senses = map_fields(_sense_of, kinds, values, rates, here.senses, here.rates, here.values, later, reach)
+    return Instant(t, s, m, k, senses, rates, values)
 
 
 # inlined, what a model does not watch costs nothing

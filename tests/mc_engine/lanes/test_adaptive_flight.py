@@ -213,13 +213,16 @@ def test_a_visit_of_a_millisecond_has_the_times_of_its_parabola_and_its_top():
     assert columns["top_m"] - 100.0 == pytest.approx(excess, abs=1e-12)
 
 
+@pytest.mark.parametrize("lag", [100.0, 1e-13, 0.0])
 @pytest.mark.parametrize("method", ["dop853", "tp86", "dp54"])
-def test_rounding_after_an_event_is_not_taken_for_the_way_back(method):
-    """The height is rounded to 1e-9 m, and the step after the way up ends below the ceiling."""
+def test_rounding_after_an_event_is_not_taken_for_the_way_back(method, lag):
+    """The height is rounded to 1e-9 m, and the step after the way up ends below the ceiling, or at once."""
     throw = load_model("grazed_ceiling.py", FOLDER)
     excess = np.geomspace(0.01, 30.0, 500)
-    columns = flown(replace(throw, clock=replace(throw.clock, method=method)), excess_m=excess, along_m_s=1e6)
+    throw = replace(throw, clock=replace(throw.clock, method=method))
+    columns = flown(throw, excess_m=excess, along_m_s=1e6, lag_s=lag)
     fall = np.sqrt(2.0 * (100.0 + excess) / 9.8) + np.sqrt(2.0 * excess / 9.8)
+    assert set(columns["status"]) == {"ok"}
     assert columns["fall_s"] == pytest.approx(fall, abs=1e-7)
 
 

@@ -24,6 +24,7 @@ UP_X, UP_Y = 0.6, 0.8  # the direction upwards
 Inputs = inputs(
     excess_m=Parameter(0.1, "height of the top above the ceiling", low=0.0),
     along_m_s=Parameter(0.0, "speed along the ceiling"),
+    lag_s=Parameter(100.0, "time from the ceiling to a late switch"),
 )
 State = states(x_m="x", y_m="y", vx_m_s="speed along x", vy_m_s="speed along y")
 Outputs = outputs(height_m="height")
@@ -80,6 +81,7 @@ MODEL = model(
     switch=switch,
     events={
         "rise": Event(ceiling, "rising", "switch"),
+        "late": Event(ceiling, "rising", "switch", rare=True, after="lag"),
         "fall": Event(ceiling, "falling", "switch"),
         "ground": Event(height, "falling", "stop"),
     },
