@@ -59,12 +59,18 @@ def _flag_of_either(before, number, wanted):
 
 
 @physics
+def _acted(due, crossing, after):
+    """Flag of the action of a delayed event: without a delay it is that of the crossing."""
+    return where(after <= 0.0, crossing, due)
+
+
+@physics
 def _due(due, crossing, acted, t, after):
     """Time at which the delayed action is due; a further crossing during the delay changes nothing."""
     due = where(acted > 0.5, NEVER, due)
     ahead = where(t + after > t, t + after, t + 4e-16 * abs(t) + 1e-300)  # a step cannot end before it begins
     ahead = where(after == after, ahead, after)
-    return where((crossing > 0.5) & (due == NEVER), ahead, due)
+    return where((crossing > 0.5) & (acted < 0.5) & (due == NEVER), ahead, due)
 
 
 @physics
@@ -216,9 +222,13 @@ class Memory:
         if function is None and not self.delayed and not any(event.to for event in self.events.values()):
             return None
         steps = _Steps()
-        acted: dict[str, Pick] = {
-            name: ("argument", _LAST, due_field(name) if name in self.delayed else name) for name in self.events
-        }
+        acted: dict[str, Pick] = {name: ("argument", _LAST, name) for name in self.events}
+        crossings = {name: acted[name] for name in self.delayed}
+        delays = {name: self._delay(event) for name, event in self.delayed.items()}
+        for name, event in self.delayed.items():
+            acted[name] = ("argument", _LAST, due_field(name))
+            if event.action != "stop":  # which only the event of its own time does
+                acted[name] = steps.add(_acted, acted[name], crossings[name], delays[name])
         state: Pick = ("argument", _STATE, "")
         now: dict[str, Pick] = {name: ("argument", _MEMORY, name) for name in self.record._fields}
         if function is not None:
@@ -228,11 +238,8 @@ class Memory:
                 copied = steps.add(self._only_own(), (*given[:2], 1))
                 now |= {name: (*copied[:2], name) for name in self._own_fields}
         t: Pick = ("argument", _TIME, "")
-        for name, event in self.delayed.items():
-            after: Pick = ("constant", float(event.after), "") if not isinstance(event.after, str) else (
-                "argument", _PARAMETERS, event.after)  # fmt: skip
-            crossing: Pick = ("argument", _LAST, name)
-            now[due_field(name)] = steps.add(_due, now[due_field(name)], crossing, acted[name], t, after)
+        for name, crossing in crossings.items():
+            now[due_field(name)] = steps.add(_due, now[due_field(name)], crossing, acted[name], t, delays[name])
         for name, event in reversed(self.events.items()):  # of two at once, the first decides
             if event.to:
                 number: Pick = ("constant", float([*self.phases].index(event.to)), "")
@@ -240,6 +247,12 @@ class Memory:
                 now[BEGAN] = steps.add(_moved, now[BEGAN], acted[name], t)
         memory = steps.add(ComposedFunction([], self.record, whole(range(len(now)))), *now.values())
         return ComposedFunction(steps.calls, tuple, [state, memory], function)
+
+    @staticmethod
+    def _delay(event: Event) -> Pick:
+        if isinstance(event.after, str):
+            return ("argument", _PARAMETERS, event.after)
+        return ("constant", float(event.after), "")
 
     def _own_switch(self, steps: "_Steps", function: Any, acted: Mapping[str, Pick]) -> Pick:
         """(state, the model's own fields) after its `switch`, which is not called for the mere crossing of an event."""
