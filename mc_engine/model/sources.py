@@ -87,17 +87,23 @@ def sources_of_file(path: Path) -> Sources:
         _NAMED[mark] = list(_named({**files, **data}, path.parent))
         with importable(path.parent, mark, files):
             module = new_module(name, path, files[path])
-            own = [known for known in sys.modules if known.startswith(USER) and known.endswith(f"_{mark}")]
-            elsewhere = {known: text for known, text in _deciding(own).items() if _file_of(known) not in files}
-        _OF_FILES[name] = Sources(module, path.parent, path.parent, files, data, elsewhere)
+            _OF_FILES[name] = Sources(module, path.parent, path.parent, files, data, _elsewhere(mark))
     return _OF_FILES[name]
 
 
 def made_of(module: str) -> list[tuple[str, bytes]]:
     """Names and contents of the sources and data of a loaded module and its package or folder, as they were read."""
     if module.startswith(USER):
-        return _NAMED[module.rpartition("_")[2]]
+        mark = module.rpartition("_")[2]
+        return [*_NAMED[mark], *_elsewhere(mark).items()]
     return list(sources_of_module(module, Path(str(sys.modules[module].__file__)).parent).named())
+
+
+def _elsewhere(mark: str) -> dict[str, bytes]:
+    """Texts of the modules with physics that a user's file, and those beside it, import from other folders."""
+    own = [name for name in [*sys.modules] if name.startswith(USER) and name.endswith(f"_{mark}")]
+    reached = _deciding(own).items()
+    return {name: text for name, text in reached if not sys.modules[name].__name__.startswith(USER)}
 
 
 def _named(contents: Mapping[Path, bytes], home: Path) -> Iterator[tuple[str, bytes]]:

@@ -1,6 +1,7 @@
 """A design is computed once for the same inputs and sources, and again after a change or where its file is damaged."""
 
 import doctest
+import os
 import subprocess
 import sys
 import time
@@ -154,6 +155,31 @@ def test_a_changed_source_of_the_model_is_another_design(folder, tmp_path, chang
         kept_design(loaded, 4.0)  # of the sources as they were loaded, whatever the files say since
         assert len(list(folder.iterdir())) == 1
         kept_design(load_model("model.py", tmp_path).sources.module.gains, 4.0)
+        assert len(list(folder.iterdir())) == count
+
+
+ELSEWHERE = """
+from pathlib import Path
+from mc_engine.model import kept_design, load_model
+module = load_model("model.py", Path.cwd()).sources.module
+assert kept_design(module.table, 2.0) == module.AT_IMPORT
+print(*module.AT_IMPORT)
+"""
+
+
+def test_changed_physics_from_another_folder_are_another_design(folder, tmp_path):
+    table = "def table(k):\n    return np.array([pull(k)])\n\n\nAT_IMPORT = kept_design(table, 2.0)\n"
+    imports = "import numpy as np\nfrom laws.pull import pull\nfrom mc_engine.model import kept_design\n"
+    (tmp_path / "model.py").write_text((SHIPPED / "minimal" / "model.py").read_text() + imports + table)
+    (tmp_path / "lib" / "laws").mkdir(parents=True)
+    env = {**ENVIRONMENT, "PYTHONPATH": f"{ENVIRONMENT['PYTHONPATH']}{os.pathsep}{tmp_path / 'lib'}"}
+    env |= {"MC_ENGINE_CACHE": str(folder.parent)}
+    for factor, count in ((3.0, 1), (3.0, 1), (30.5, 2)):
+        pull = f"from mc_engine.lanes import physics\n\n\n@physics\ndef pull(x):\n    return {factor} * x\n"
+        (tmp_path / "lib" / "laws" / "pull.py").write_text(pull)
+        command = [sys.executable, "-c", ELSEWHERE]
+        done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True)
+        assert done.stdout == f"{2.0 * factor}\n", done.stderr
         assert len(list(folder.iterdir())) == count
 
 
