@@ -6,7 +6,7 @@ are not used, because Python matches them to a source only by its size and its m
 
 import linecache
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader, SourcelessFileLoader
@@ -143,10 +143,10 @@ class _Packages(MetaPathFinder):
             known[file] = file.read_bytes()
         return known[file]
 
-    def data(self, root: str, contents: Mapping[Path, bytes], was_loaded: bool) -> dict[Path, bytes]:
-        """These contents of a model's data; where it was loaded before and a file was given, the content then."""
+    def data(self, root: str, contents: Mapping[Path, bytes], read: Collection[Path]) -> dict[Path, bytes]:
+        """These contents of a model's data; of what modules in memory have read and was given before, that of then."""
         known = self.contents.setdefault(root, {})
-        known |= {file: content for file, content in contents.items() if not (was_loaded and file in known)}
+        known |= {file: content for file, content in contents.items() if not (file in read and file in known)}
         return {file: known[file] for file in contents}
 
     @contextmanager

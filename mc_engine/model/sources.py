@@ -137,6 +137,14 @@ def _data_in(folder: Path, sources: Mapping[Path, bytes]) -> dict[Path, bytes]:
     return {**_curves_beside(sources), **_files_named(names, folder)}
 
 
+def _data_of(sources: Mapping[Path, bytes]) -> dict[Path, bytes]:
+    """Contents of the data and curves that these sources name, from the folder of each."""
+    data = _curves_beside(sources)
+    for file, source in sources.items():
+        data |= _files_named(data_names(source), file.parent)
+    return data
+
+
 def _curves_beside(sources: Mapping[Path, bytes]) -> dict[Path, bytes]:
     """Contents of the files, named from the folder of each source, that its curves and surfaces are read from."""
     contents: dict[Path, bytes] = {}
@@ -187,7 +195,7 @@ def sources_of_module(name: str, folder: Path) -> Sources:
     What a program has imported before, by itself, counts as what its files say now.
     """
     root = name.partition(".")[0]
-    data, was_loaded = _data_in(folder, _contents(folder.glob("*.py"))), name in sys.modules
+    data, before = _data_in(folder, _contents(folder.glob("*.py"))), {*sys.modules}
     with PACKAGES.loading(root):
         module = import_module(name)
     assert module.__file__ is not None  # a model's module always comes from a file
@@ -195,10 +203,11 @@ def sources_of_module(name: str, folder: Path) -> Sources:
     inside_package = home.name == "__init__.py" or "." in name
     beside = home.parent.rglob("*.py") if inside_package else home.parent.glob("*.py")
     contents = {path: PACKAGES.read(root, path) for path in beside if path.is_file()}
-    contents |= {_file_of(reached): text for reached, text in _deciding([name]).items()}
-    for file, source in contents.items():
-        data = {**_files_named(data_names(source), file.parent), **data}
-    data = PACKAGES.data(root, {**_curves_beside(contents), **data}, was_loaded)
+    reached = _deciding([name])
+    contents |= {_file_of(known): text for known, text in reached.items()}
+    loaded = {_file_of(known) for known in (name, *reached) if known in before}
+    read = _data_of({file: text for file, text in contents.items() if file in loaded})
+    data = PACKAGES.data(root, {**_data_of(contents), **data}, read)
     base = home.parents[name.count(".") + (home.name == "__init__.py")]
     return Sources(module, base, folder, contents, data)
 

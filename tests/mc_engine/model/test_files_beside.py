@@ -8,8 +8,9 @@ import pytest
 
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.campaign.search import SHIPPED
-from mc_engine.errors import CampaignError, StoreError
+from mc_engine.errors import CampaignError, ModelError, StoreError
 from mc_engine.flight.kernel import source_digest
+from mc_engine.model import load_model
 from mc_engine.runner.flown_campaign import companions_of
 from mc_engine.runner.runner import extend, replay, run
 from mc_engine.store.opening import open_store
@@ -246,6 +247,17 @@ def test_data_of_an_installed_model_count_as_its_source(tmp_path, monkeypatch):
     (tmp_path / "pkg_data" / "factors.csv").write_text("4.1e14,0.0\n")  # the module in memory has the numbers of before
     with pytest.raises(CampaignError, match=r'"factors.csv" was changed .* begin again in a new Python process'):
         load_campaign(tmp_path / "campaign.toml")
+
+
+def test_a_curve_that_another_model_of_the_package_has_read_is_not_taken_as_it_is_now(tmp_path, monkeypatch):
+    curve = "from mc_engine.physics.curves import curve\nK = curve('k.csv', y_unit='m')\n"
+    files = {name: f"{MODEL}\nfrom pkg_curve.common import K\n" for name in ("a.py", "b.py")}
+    put(tmp_path / "pkg_curve", {**files, "common.py": curve, "k.csv": "x,y\n0,1\n5,1\n"})
+    monkeypatch.syspath_prepend(tmp_path)
+    load_model("pkg_curve.a")
+    (tmp_path / "pkg_curve" / "k.csv").write_text("x,y\n0,2\n5,2\n")
+    with pytest.raises(ModelError, match=r'"k.csv" was changed .* begin again in a new Python process'):
+        load_model("pkg_curve.b")
 
 
 @pytest.mark.parametrize("other", ["pipe", "folder", "lost link", "deep", "signs"])
