@@ -34,7 +34,7 @@ from mc_engine.command_line.app import (
     run_here,
     write_reports,
 )
-from mc_engine.command_line.next_step import MERGE, MERGE_AGAIN, after_flight, is_complete, journal_lines
+from mc_engine.command_line.next_step import MERGE, after_flight, after_merge, is_complete, journal_lines
 from mc_engine.errors import DiskError, RunInterrupted, UsageError
 from mc_engine.interruption import NOTHING_BEGUN, advise, raise_if_signalled
 from mc_engine.shell_words import shell_word
@@ -393,5 +393,5 @@ def merge(
             shards[0],
         )
     except DiskError as error:
-        raise DiskError(f"{error}; {MERGE_AGAIN.format(shell_word(out))}") from error
+        raise DiskError("; ".join(filter(None, [str(error), after_merge(out)]))) from error
     finish(store, no_report)

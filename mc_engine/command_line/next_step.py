@@ -10,7 +10,6 @@ from mc_engine.shell_words import shell_word
 from mc_engine.store.run_files import JOURNAL, MANIFEST
 
 MERGE = "`mc-engine merge RUN SHARD...` makes one run of all shards, and its reports"
-MERGE_AGAIN = "remove {0} and run the same `mc-engine merge` again; `mc-engine resume {0}` would fly its cases anew"
 _UNFINISHED = ("created", "started", "rerun", "extended", "part-withdrawn")  # events that `finished` has to follow
 
 
@@ -25,8 +24,8 @@ def after_flight(run: Path, options: str = "", url: str | None = None, rerun: bo
     import json  # not for `--help`
 
     events, manifest = _events(run), json.loads((run / MANIFEST).read_bytes())
-    if "merged" in events and "started" not in events:
-        return f"interrupted; {MERGE_AGAIN.format(shell_word(run))}"
+    if advice := after_merge(run):
+        return f"interrupted; {advice}"
     # a run with interim analyses is complete once it is decided, which `resume` finds out
     if manifest.get("looks") or not _is_finished(events):
         command = "rerun --failed" if rerun and "rerun" in events else "resume"
@@ -38,6 +37,15 @@ def after_flight(run: Path, options: str = "", url: str | None = None, rerun: bo
         return f"interrupted; all cases of the shard are in {run}, `mc-engine merge RUN SHARD...` joins the shards"
     copy = f", `mc-engine publish {shell_word(run)} {shell_word(url)}` sends them and the cases" if url else ""
     return f"interrupted; all cases are there, `mc-engine report {shell_word(run)}` writes the reports{copy}"
+
+
+def after_merge(run: Path) -> str:
+    """What to do about a merge that broke off before it had taken over all rows of its shards; "" for any other run."""
+    events = _events(run) if (run / JOURNAL).is_file() else []
+    if "merged" not in events or "started" in events:
+        return ""
+    word = shell_word(run)
+    return f"remove {word} and run the same `mc-engine merge` again; `mc-engine resume {word}` would fly its cases anew"
 
 
 def is_complete(run: Path) -> bool:
