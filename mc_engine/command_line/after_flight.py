@@ -203,7 +203,7 @@ def export(
     frame: Annotated[str | None, typer.Option(help="For oem: reference frame of the columns, such as EME2000.")] = None,
     centre: Annotated[str | None, typer.Option(help="For oem: the body at the origin; by default EARTH.")] = None,
 ) -> None:
-    """Write the end states of the cases, or the metrics of a run without, to a file for other tools."""
+    """Write the end states of the cases to a file for other tools."""
     if kind not in EXPORT_FORMATS:
         leave(USAGE, f'--format "{kind}" is not known; {" or ".join(EXPORT_FORMATS)}')
     if out is None and is_url(place):
