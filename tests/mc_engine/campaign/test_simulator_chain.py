@@ -20,7 +20,9 @@ def test_check_does_not_ask_whether_an_input_moves_a_metric_where_no_input_was_m
     (tmp_path / "factor.py").write_text(SIMULATOR)
     (tmp_path / "first.toml").write_text(HEAD + DISPERSED)
     (tmp_path / "second.toml").write_text(HEAD + '[inputs]\nfrom = "first.toml"\ncolumns = { length_m = "twice_m" }\n')
-    for name in ("first", "second"):
+    (tmp_path / "idle.py").write_text(SIMULATOR.replace('2.0 * inputs["length_m"]', "2.0"))
+    (tmp_path / "idle.toml").write_text(HEAD.replace("factor.py", "idle.py") + DISPERSED)
+    for name, asked in [("first", False), ("second", False), ("idle", True)]:
         checked = call("check", tmp_path / f"{name}.toml")
         assert checked.exit_code == 0, checked.output
-        assert "does an input move it?" not in checked.stdout
+        assert ("does an input move it?" in checked.stdout) == asked
