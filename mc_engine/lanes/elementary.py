@@ -14,9 +14,9 @@ from mc_engine.lanes.functions import (
     maximum,
     minimum,
     rint,
+    scaled,
     sign_copied,
     sqrt,
-    two_to,
     where,
 )
 from mc_engine.lanes.physics_function import physics
@@ -33,6 +33,12 @@ _TAN_EIGHTH_PI = 0.4142135623730951
 # ln 2 with 21 trailing zero bits, so that n * _LN2 is exact for every exponent n
 _LN2, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 _LOG2_E = 1.4426950408889634
+# e**r = 1 + r + r**2 / 2 + c3 r**3 + ... + c11 r**11, of the smallest relative error (5.9e-18) for |r| <= ln 2 / 2
+_EXP = (
+    *(0.16666666666666433, 0.041666666666604, 0.008333333333499915),
+    *(0.0013888888926778442, 0.00019841269466431397, 2.480150870702109e-05),
+    *(2.7557640736100665e-06, 2.762517634505255e-07, 2.497839973900035e-08),
+)
 
 
 @physics
@@ -54,20 +60,17 @@ def rsqrt(x):
 
 @physics
 def _exp_of_sum(x, x_low):
-    """e**(x + x_low) for |x_low| below an ulp of x: Cody-Waite reduction, Taylor terms by Estrin's scheme."""
+    """e**(x + x_low) for |x_low| below an ulp of x: Cody-Waite reduction, and a polynomial by Estrin's scheme."""
     x = minimum(maximum(x, -746.0), 710.0)
     n = rint(x * _LOG2_E)
     r = fma(n, -_LN2_LOW, fma(n, -_LN2, x)) + x_low
     r2 = r * r
     r4 = r2 * r2
-    start = fma(fma(r, 1 / 6.0, 0.5), r2, r)
-    low = fma(fma(r, 1 / 5040.0, 1 / 720.0), r2, fma(r, 1 / 120.0, 1 / 24.0))
-    middle = fma(fma(r, 1 / 39916800.0, 1 / 3628800.0), r2, fma(r, 1 / 362880.0, 1 / 40320.0))
-    high = fma(fma(r, 1 / 6227020800.0, 1 / 479001600.0), r4, middle)
-    series = 1.0 + fma(high, r4 * r4, fma(low, r4, start))
-    # two factors, because 2**n alone leaves the range of doubles before the result does
-    half = rint(n * 0.5)
-    return series * two_to(half) * two_to(n - half)
+    c3, c4, c5, c6, c7, c8, c9, c10, c11 = _EXP
+    start = fma(fma(r, c3, 0.5), r2, r)
+    low = fma(fma(r, c7, c6), r2, fma(r, c5, c4))
+    high = fma(fma(r, c11, c10), r2, fma(r, c9, c8))
+    return scaled(1.0 + fma(fma(high, r4, low), r4, start), n)
 
 
 @physics

@@ -1,8 +1,9 @@
 """The block loop on a fixed time grid: W cases side by side, sampled control, events, running extrema.
 
-All lanes of a block share the grid.  A lane in which an event happens flies to the end of the step on its own, and
-rejoins the others there.  Lanes are independent: one that has ended or failed keeps its last values.  Its discrete
-state is saved apart, because a choice between old and new at every sample would copy all of it.
+All lanes of a block share the grid, so the time of a grid point is one number, and what depends on time alone is
+computed once.  A lane in which an event happens flies to the end of the step on its own, and rejoins the others there.
+Lanes are independent: one that has ended or failed keeps its last values.  Its discrete state is saved apart, because
+a choice between old and new at every sample would copy all of it.
 
 The loop takes a `Method`: the classical Runge-Kutta method of fourth order, which is here, or one that uses earlier
 steps (`multistep`, `gauss_jackson`).  W. Kutta, Zeitschrift für Mathematik und Physik 46 (1901) 435-453.
@@ -38,7 +39,8 @@ from mc_engine.status import EVENT_LIMIT, NO_STOP, NOT_FINITE
 # How a state is taken along the grid.  `past` is what a method knows of earlier steps; `tables` are its numbers.
 # begin(tables, memory, looks, s, t) : past of the first state; memory : room for `MOST_SLOPES` derivatives
 # restart(past, lanes) : past without the earlier steps of some lanes, whose discrete state has changed
-# advance(f, tables, past, t, finish, h, s, m, p, o, flying) : (state at the end of a grid step, past)
+# advance(f, tables, past, begin, finish, h, s, m, p, o, flying) : (state at the end of a grid step, past); the times of
+# its ends are numbers, not lanes
 # single(f, tables, t, h, s, m, p, o) : state after a step of length h [s], lanes, from a state alone
 # track(past, number, t, h, closing, lanes, smooth, seen, lasts, best, when, last) : running extrema and past after one
 # more look at the outputs, the `number`th of the flight, at t, the newest of five `seen`; closing : the last of `lanes`
@@ -54,16 +56,17 @@ _OVERRUN, _BROKEN, _UNSTOPPED = float(EVENT_LIMIT), float(NOT_FINITE), float(NO_
 
 @physics
 def _weighted(y, sixth, k1, k2, k3, k4):
-    return fma(sixth, fma(2.0, k2 + k3, k1 + k4), y)
+    middle = k2 + k3  # twice by a sum: processors have more room for sums than for products
+    return fma(sixth, (middle + middle) + (k1 + k4), y)
 
 
 def _rk4(f, tables, t, h, s, m, p, o):
-    """State after one step of length h [s] (a number or lanes) from state s at time t."""
+    """State after one step of length h [s] from state s at time t, each a number or lanes."""
     half = 0.5 * h
-    k1 = spread(f.rhs(t, s, m, p, o), t)
-    k2 = spread(f.rhs(t + half, add_scaled(s, half, k1), m, p, o), t)
-    k3 = spread(f.rhs(t + half, add_scaled(s, half, k2), m, p, o), t)
-    k4 = spread(f.rhs(t + h, add_scaled(s, h, k3), m, p, o), t)
+    k1 = spread(f.rhs(t, s, m, p, o), s[0])
+    k2 = spread(f.rhs(t + half, add_scaled(s, half, k1), m, p, o), s[0])
+    k3 = spread(f.rhs(t + half, add_scaled(s, half, k2), m, p, o), s[0])
+    k4 = spread(f.rhs(t + h, add_scaled(s, h, k3), m, p, o), s[0])
     return map_fields(_weighted, s, h * (1.0 / 6.0), k1, k2, k3, k4)
 
 
@@ -81,8 +84,8 @@ def _restart(past, lanes):
     return past
 
 
-def _advance(f, tables, past, t, finish, h, s, m, p, o, flying):
-    return rk4(f, tables, t, h, s, m, p, o), past
+def _advance(f, tables, past, begin, finish, h, s, m, p, o, flying):
+    return rk4(f, tables, begin, h, s, m, p, o), past
 
 
 begin, restart, advance = compile_inline(_begin), compile_inline(_restart), compile_inline(_advance)
@@ -165,20 +168,20 @@ def _looks_from(v, w, t):
 looks_from = compile_inline(_looks_from)
 
 
-def _step(f, method, past, has_events, t, finish, h, s, m, p, o, flying, reached, history, rows):
-    """One grid step from t to `finish`: (state, memory, time, stopped, overrun, broken, past, reached) of every lane.
+def _step(f, method, past, has_events, begin, finish, h, s, m, p, o, flying, reached, history, rows):
+    """One grid step: (state, memory, time, stopped, overrun, broken, past, reached) of every lane.
 
     The event values at the start are computed again, not passed on: they share computations with the first derivative.
     """
-    end, past = method.advance(f, method.tables, past, t, finish, h, s, m, p, o, flying)
-    now, stopped = finish, flying & (not flying)
+    end, past = method.advance(f, method.tables, past, begin, finish, h, s, m, p, o, flying)
+    now, stopped = spread(finish, s[0]), flying & (not flying)
     overrun = lost = stopped
     if has_events:
-        g, g_end = spread(f.events(t, s, m, p, o), t), spread(f.events(now, end, m, p, o), t)
+        g, g_end = spread(f.events(begin, s, m, p, o), now), spread(f.events(finish, end, m, p, o), now)
         met = flying & any_field(map_fields(may_have_crossed, g, g_end, f.signs_of(g)))
         if any_lane(met):
             end, m, now, stopped, overrun, lost, reached = follow(
-                f, method, t, finish, h, s, end, m, p, o, g, g_end, flying, reached, history, rows
+                f, method, spread(begin, now), now, h, s, end, m, p, o, g, g_end, flying, reached, history, rows
             )
             past = method.restart(past, met)
     size = total_in_pairs(end)
@@ -205,25 +208,24 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
     v0 = v1 = v2 = v3 = best = f.peaks_of(seen)
     w3 = f.lasts_of(seen)
     when, last = map_fields(extrema.first_time, v3, t), map_fields(extrema.first_time, w3, t)
-    begin = t
     past = method.begin(method.tables, stage_memory(s, MOST_SLOPES), looks_from(v3, w3, t), s, t)
     last_memory = m
     for k in range(n_steps):
+        # the grid's own time, not a sum of steps: no rounding piles up, and a sample falls where it belongs
+        begin, finish = float(k) * h, float(k + 1) * h  # of lanes that fly, `begin` is the time t
         recorded = history.shape[0] > 0 and k % stride == 0
         if k > 0 and k % control_every == 0:
             if recorded:
-                record_row(f, history, rows, flying, begin, s, m, p, o)
+                record_row(f, history, rows, flying, t, s, m, p, o)
             held = spread(f.control(begin, s, m, p, o, Draws(key, case, float(k // control_every))), t)
             past = method.restart(past, unequal(m, held, t))
             m = held  # of lanes that have ended, too: what they held then is in `last_memory`
         seen = spread(f.observe(begin, s, m, p, o), t)
         v4, w4 = f.peaks_of(seen), f.lasts_of(seen)
         smooth, looks, lasts = f.smooth_of(v4), (v0, v1, v2, v3, v4), (w3, w4)
-        best, when, last, past = method.track(past, k, begin, h, False, flying, smooth, looks, lasts, best, when, last)
+        best, when, last, past = method.track(past, k, t, h, False, flying, smooth, looks, lasts, best, when, last)
         if recorded:  # looked at anew: so the outputs that only a history wants cost nothing where there is none
-            record_row(f, history, rows, flying, begin, s, m, p, o)
-        # the grid's own time, not a sum of steps: no rounding piles up, and a sample falls where it belongs
-        finish = grid_time(k + 1, h, case)
+            record_row(f, history, rows, flying, t, s, m, p, o)
         end, memory, now, stopped, overrun, broken, past, (best, when, last) = step(
             f, method, past, has_events, begin, finish, h, s, m, p, o, flying, (best, when, last), history, rows
         )
@@ -248,7 +250,6 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
         if not any_lane(flying):
             break
         v0, v1, v2, v3, w3 = v1, v2, v3, v4, w4
-        begin = finish
     return t, s, last_memory, status, flying, best, when, last
 
 

@@ -130,6 +130,16 @@ def two_to(n):
 
 
 @taking_numbers
+def scaled(x, n):
+    """x 2**n for 0.5 <= x < 2 and a whole number -1100 <= n <= 1100, given as a float; rounded once.  NaN if n is."""
+    if isinstance(x, float) and isinstance(n, float) and -1100.0 <= n < 1023.0:
+        return math.ldexp(x, int(n))
+    n = np.asarray(n, dtype=np.float64)
+    with np.errstate(over="ignore", under="ignore"):
+        return _plain(np.where(np.isfinite(n), np.ldexp(x, np.nan_to_num(n).astype(np.int64)), np.nan))
+
+
+@taking_numbers
 def exponent(x):
     """floor(log2 |x|) as a float, for normal x: the number's own binary exponent."""
     if isinstance(x, float):

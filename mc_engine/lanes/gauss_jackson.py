@@ -132,16 +132,16 @@ def _added(h, total, summand, lost):
 added = compile_inline(_added)
 
 
-def _advance(f, tables, past, t, finish, h, s, m, p, o, flying):
+def _advance(f, tables, past, begin, finish, h, s, m, p, o, flying):
     """(State at the end of a grid step, past): by DOP853 in lanes with too few past accelerations."""
     columns, ahead, present, n, positions_of, rates_of, in_order = tables[4:]
-    slope = spread(f.rhs(t, s, m, p, o), t)
+    slope = spread(f.rhs(begin, s, m, p, o), s[0])
     acceleration = rates_of(slope)
     newest = (past.newest if past.newest > 0 else n) - 1
     place, last = newest * n, (newest + 1) * n
     put_stage(past.accelerations, newest, acceleration)
     # the compiler sees that a derivative is the rate itself, and leaves the comparison out
-    known = where(differ(positions_of(slope), rates_of(s), t), 0.0, past.known + 1.0)
+    known = where(differ(positions_of(slope), rates_of(s), s[0]), 0.0, past.known + 1.0)
     ready = known >= float(n)
     starting, beginning = flying & (not ready), known == float(n)
     first, first_lost = added(h, past.first, acceleration, past.first_lost)
@@ -159,7 +159,7 @@ def _advance(f, tables, past, t, finish, h, s, m, p, o, flying):
         rates, positions = add_scaled(first, h, of_rates), add_scaled(second, h * h, of_positions)
         end = first_fields(in_order(joined(positions, rates)), s)
     if any_lane(starting):
-        end = select(starting, single(f, tables, t, 0.0 * t + h, s, m, p, o), end)
+        end = select(starting, single(f, tables, spread(begin, known), spread(h, known), s, m, p, o), end)
     return end, Past(past.accelerations, newest, known, first, second, first_lost, second_lost, past.looks)
 
 

@@ -14,7 +14,7 @@ from mc_engine.errors import ModelError
 from mc_engine.lanes import kernel_data
 from mc_engine.lanes.call_frame import BLOCK, DATA, KernelCalls, PartCalls
 from mc_engine.lanes.lane_type import F64, I32, I64, common_width, is_number, number_type
-from mc_engine.lanes.lowering import constant, llvm_type
+from mc_engine.lanes.lowering import constant, llvm_type, shuffle
 
 
 class BlockType(types.Opaque):
@@ -171,14 +171,9 @@ def _columns(builder, rows, count):
     """The rows of all lanes turned into one vector of lanes for each number."""
     while len(rows) > 1:
         pairs = zip(rows[::2], rows[1::2], strict=True)
-        rows = [_shuffle(builder, a, b, range(2 * a.type.count)) for a, b in pairs]
+        rows = [shuffle(builder, a, b, range(2 * a.type.count)) for a, b in pairs]
     whole = rows[0]
-    return [_shuffle(builder, whole, whole, range(i, whole.type.count, count)) for i in range(count)]
-
-
-def _shuffle(builder, a, b, order):
-    places = list(order)
-    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(I32, len(places)), places))
+    return [shuffle(builder, whole, whole, range(i, whole.type.count, count)) for i in range(count)]
 
 
 _register(kernel_data.row_of_two, 2)

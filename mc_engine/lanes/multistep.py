@@ -143,10 +143,10 @@ def _single(f, tables, t, h, s, m, p, o):
 single = compile_callable(_single)
 
 
-def _advance(f, tables, past, t, finish, h, s, m, p, o, flying):
+def _advance(f, tables, past, begin, finish, h, s, m, p, o, flying):
     """(State at the end of a grid step, past): by DOP853 in lanes with too few past slopes."""
     columns, ahead, behind, at_end, n = tables[4:]
-    slope = spread(f.rhs(t, s, m, p, o), t)
+    slope = spread(f.rhs(begin, s, m, p, o), s[0])
     newest = (past.newest if past.newest > 0 else n) - 1
     put_stage(past.differences, newest, map_fields(_difference, slope, past.slope))
     known = past.known + 1.0
@@ -156,14 +156,14 @@ def _advance(f, tables, past, t, finish, h, s, m, p, o, flying):
     end, lost = s, past.lost
     if any_lane(ready):
         mean = map_fields(_plus, slope, stage_sum(past.differences, s, first, last, columns, ahead))
-        predicted = spread(f.rhs(finish, add_scaled(s, h, mean), m, p, o), t)
+        predicted = spread(f.rhs(finish, add_scaled(s, h, mean), m, p, o), s[0])
         sum_behind = stage_sum(past.differences, s, first, last, columns, behind)
         correction = add_scaled(sum_behind, at_end, map_fields(_difference, predicted, slope))
         change = map_fields(_change, h, slope, correction, lost)
         end = map_fields(_plus, s, change)
         lost = map_fields(_lost, s, end, change)
     if any_lane(starting):
-        end = select(starting, single(f, tables, t, 0.0 * t + h, s, m, p, o), end)
+        end = select(starting, single(f, tables, spread(begin, known), spread(h, known), s, m, p, o), end)
         lost = select(starting, map_fields(_none, s), lost)
     return end, Past(past.differences, newest, slope, known, lost, past.looks)
 

@@ -36,12 +36,13 @@ def oblate(x, y, z, mu):
 
     Curtis, Orbital Mechanics for Engineering Students, 3rd ed., eq. (12.30) added to the point's.
     """
-    r2 = fma(x, x, fma(y, y, z * z))
+    z2 = z * z
+    r2 = fma(x, x, fma(y, y, z2))
     u2 = 1.0 / r2
-    r = sqrt(r2)
-    g = -mu * (u2 * u2) * r
-    q = 1.5 * J2_EARTH * mu * (EQUATORIAL_RADIUS * EQUATORIAL_RADIUS) * (u2 * u2 * u2) * r
-    k = 5.0 * z * z * u2
+    u3 = u2 * u2 * sqrt(r2)
+    g = -mu * u3
+    q = 1.5 * J2_EARTH * mu * (EQUATORIAL_RADIUS * EQUATORIAL_RADIUS) * u2 * u3
+    k = 5.0 * u2 * z2
     across, along = fma(q, k - 1.0, g), fma(q, k - 3.0, g)
     return across * x, across * y, along * z
 

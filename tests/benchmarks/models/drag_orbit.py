@@ -46,7 +46,7 @@ def acceleration(s, p, air):
     """
     gx, gy, gz = oblate(s.x, s.y, s.z, MU_EARTH)
     h = sqrt(fma(s.x, s.x, fma(s.y, s.y, s.z * s.z))) - EQUATORIAL_RADIUS  # written as in `oblate`: one root for both
-    ux, uy = s.vx + EARTH_RATE * s.y, s.vy - EARTH_RATE * s.x
+    ux, uy = fma(EARTH_RATE, s.y, s.vx), fma(-EARTH_RATE, s.x, s.vy)
     speed = sqrt(fma(ux, ux, fma(uy, uy, s.vz * s.vz)))
     d = p.drag * exponential(h, air[0], air[1], air[2]) * speed
     return fma(d, ux, gx), fma(d, uy, gy), fma(d, s.vz, gz)

@@ -62,8 +62,8 @@ def initial():
 
 
 @physics
-def _along(c, x1, x2, x3, x4):
-    return fma(c[0], x1, fma(c[1], x2, fma(c[2], x3, c[3] * x4)))
+def _along(c, x1, x2, x3, x4, total):
+    return fma(c[0], x1, fma(c[1], x2, fma(c[2], x3, fma(c[3], x4, total))))
 
 
 @physics
@@ -73,57 +73,56 @@ def _dot(ax, ay, az, bx, by, bz):
 
 @physics
 def _torque(s):
-    """Control torque [N m], eqs (11), (13)-(16), its size limited."""
+    """Control torque [N m], eqs (11), (13)-(16), and what part of it the limit of its size leaves."""
     fast = _dot(s.wx, s.wy, s.wz, s.wx, s.wy, s.wz) >= LARGEST_RATE * LARGEST_RATE
-    kd, kp = where(fast, DELTA_D * KD, KD), where(fast, KP / DELTA_P, KP)
-    ki = where(fast, KI / DELTA_I, KI)
-    x = -fma(kd, s.wx, fma(kp, s.q1, ki * fma(-GAMMA, s.q1 - FIRST_QUATERNION[1], s.nx)))
-    y = -fma(kd, s.wy, fma(kp, s.q2, ki * fma(-GAMMA, s.q2 - FIRST_QUATERNION[2], s.ny)))
-    z = -fma(kd, s.wz, fma(kp, s.q3, ki * fma(-GAMMA, s.q3 - FIRST_QUATERNION[3], s.nz)))
-    size = sqrt(_dot(x, y, z, x, y, z) + 1e-300)
-    share = minimum(1.0, LARGEST_TORQUE / size)
-    return share * x, share * y, share * z
+    kd, kp = where(fast, -DELTA_D * KD, -KD), where(fast, -KP / DELTA_P, -KP)
+    ki = where(fast, -KI / DELTA_I, -KI)
+    x = fma(kd, s.wx, fma(kp, s.q1, ki * fma(-GAMMA, s.q1 - FIRST_QUATERNION[1], s.nx)))
+    y = fma(kd, s.wy, fma(kp, s.q2, ki * fma(-GAMMA, s.q2 - FIRST_QUATERNION[2], s.ny)))
+    z = fma(kd, s.wz, fma(kp, s.q3, ki * fma(-GAMMA, s.q3 - FIRST_QUATERNION[3], s.nz)))
+    size = sqrt(fma(x, x, fma(y, y, fma(z, z, 1e-300))))
+    return x, y, z, minimum(1.0, LARGEST_TORQUE / size)
 
 
 @physics
 def rhs(t, s, p):
     """Derivative of the state: eqs (1), (2) solved for the rates, (5)-(9), and the integral in (13)."""
-    ux, uy, uz = _torque(s)
+    ux, uy, uz, share = _torque(s)
     td = DISTURBANCE * (sin(t) + p.offset)
     c1, c2, c3 = COUPLING
-    hx = fma(p.jx, s.wx, _along(c1, s.b1, s.b2, s.b3, s.b4))
-    hy = fma(p.jy, s.wy, _along(c2, s.b1, s.b2, s.b3, s.b4))
-    hz = fma(p.jz, s.wz, _along(c3, s.b1, s.b2, s.b3, s.b4))
+    hx = _along(c1, s.b1, s.b2, s.b3, s.b4, p.jx * s.wx)
+    hy = _along(c2, s.b1, s.b2, s.b3, s.b4, p.jy * s.wy)
+    hz = _along(c3, s.b1, s.b2, s.b3, s.b4, p.jz * s.wz)
     e1 = fma(2.0 * DAMPING[0] * FREQUENCY[0], s.b1, FREQUENCY[0] * FREQUENCY[0] * s.a1)
     e2 = fma(2.0 * DAMPING[1] * FREQUENCY[1], s.b2, FREQUENCY[1] * FREQUENCY[1] * s.a2)
     e3 = fma(2.0 * DAMPING[2] * FREQUENCY[2], s.b3, FREQUENCY[2] * FREQUENCY[2] * s.a3)
     e4 = fma(2.0 * DAMPING[3] * FREQUENCY[3], s.b4, FREQUENCY[3] * FREQUENCY[3] * s.a4)
-    tx = fma(s.wz, hy, fma(-s.wy, hz, ux + td + _along(c1, e1, e2, e3, e4)))
-    ty = fma(s.wx, hz, fma(-s.wz, hx, uy + td + _along(c2, e1, e2, e3, e4)))
-    tz = fma(s.wy, hx, fma(-s.wx, hy, uz + td + _along(c3, e1, e2, e3, e4)))
+    tx = fma(s.wz, hy, fma(-s.wy, hz, _along(c1, e1, e2, e3, e4, fma(share, ux, td))))
+    ty = fma(s.wx, hz, fma(-s.wz, hx, _along(c2, e1, e2, e3, e4, fma(share, uy, td))))
+    tz = fma(s.wy, hx, fma(-s.wx, hy, _along(c3, e1, e2, e3, e4, fma(share, uz, td))))
     dx = _dot(p.ixx, p.ixy, p.ixz, tx, ty, tz)
     dy = _dot(p.ixy, p.iyy, p.iyz, tx, ty, tz)
     dz = _dot(p.ixz, p.iyz, p.izz, tx, ty, tz)
     # rate relative to the orbital frame, eqs (7)-(9)
     rx = fma(2.0 * ORBITAL_RATE, fma(s.q1, s.q2, s.q0 * s.q3), s.wx)
-    ry = fma(ORBITAL_RATE, fma(s.q0, s.q0, fma(-s.q1, s.q1, fma(s.q2, s.q2, -(s.q3 * s.q3)))), s.wy)
+    ry = fma(ORBITAL_RATE, fma(-s.q1, s.q1, fma(s.q2, s.q2, fma(-s.q3, s.q3, s.q0 * s.q0))), s.wy)
     rz = fma(2.0 * ORBITAL_RATE, fma(s.q2, s.q3, -(s.q0 * s.q1)), s.wz)
     return State(
         wx=dx,
         wy=dy,
         wz=dz,
         q0=-0.5 * _dot(s.q1, s.q2, s.q3, rx, ry, rz),
-        q1=0.5 * _dot(s.q0, s.q2, -s.q3, rx, rz, ry),
-        q2=0.5 * _dot(s.q0, s.q3, -s.q1, ry, rx, rz),
-        q3=0.5 * _dot(s.q0, s.q1, -s.q2, rz, ry, rx),
+        q1=0.5 * _dot(-s.q3, s.q0, s.q2, ry, rx, rz),
+        q2=0.5 * _dot(-s.q1, s.q0, s.q3, rz, ry, rx),
+        q3=0.5 * _dot(-s.q2, s.q0, s.q1, rx, rz, ry),
         a1=s.b1,
         a2=s.b2,
         a3=s.b3,
         a4=s.b4,
-        b1=-e1 - _dot(c1[0], c2[0], c3[0], dx, dy, dz),
-        b2=-e2 - _dot(c1[1], c2[1], c3[1], dx, dy, dz),
-        b3=-e3 - _dot(c1[2], c2[2], c3[2], dx, dy, dz),
-        b4=-e4 - _dot(c1[3], c2[3], c3[3], dx, dy, dz),
+        b1=fma(-c1[0], dx, fma(-c2[0], dy, fma(-c3[0], dz, -e1))),
+        b2=fma(-c1[1], dx, fma(-c2[1], dy, fma(-c3[1], dz, -e2))),
+        b3=fma(-c1[2], dx, fma(-c2[2], dy, fma(-c3[2], dz, -e3))),
+        b4=fma(-c1[3], dx, fma(-c2[3], dy, fma(-c3[3], dz, -e4))),
         nx=fma(C1, s.wx, C2 * s.q1),
         ny=fma(C1, s.wy, C2 * s.q2),
         nz=fma(C1, s.wz, C2 * s.q3),

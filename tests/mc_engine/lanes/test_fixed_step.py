@@ -7,7 +7,10 @@ from plain_steps import ahead, twin
 
 from mc_engine.flight.flight import fly_history
 from mc_engine.lanes.functions import fma
+from mc_engine.lanes.kernel_cache import Kernel
+from mc_engine.model import load_model
 
+PUSHED = load_model("pushed_spring.py", FOLDER)
 RANDOM = np.random.default_rng(3)
 MIXED = {
     "rate_rad_s": RANDOM.uniform(0.5, 2.0, 37),
@@ -49,6 +52,17 @@ def test_a_plain_loop_over_python_floats_gives_the_same_bits(width):
         s, m = twin(ClassicSteps(), case, 9, 0.1, MIXED)
         assert (columns["end_x_km"][case], columns["end_v_m_s"][case]) == (s.x / 1e3, s.v)
         assert (columns["samples"][case], columns["sampled_at_s"][case]) == (m.samples, m.sampled_at)
+
+
+def test_what_depends_on_time_alone_is_computed_once_for_all_lanes(monkeypatch):
+    kernels, loaded = [], Kernel._loaded
+    monkeypatch.setattr(Kernel, "_loaded", lambda self, form: (kernels.append((self, form)), loaded(self, form))[1])
+    ends = flown(PUSHED, frequency_rad_s=np.full(8, 2.0))["end_m"]
+    np.testing.assert_allclose(ends, (np.sin(10.0) - 0.5 * np.sin(20.0)) / 3.0, atol=1e-5)
+    ((kernel, form),) = kernels
+    code = kernel.library(form)[1].get_llvm_str()
+    assert "call double @llvm.rint.f64" in code  # of the sine
+    assert "@llvm.rint.v8f64" not in code
 
 
 def test_a_case_keeps_its_bytes_in_any_order_among_any_cases():
