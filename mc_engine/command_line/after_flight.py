@@ -23,7 +23,7 @@ from mc_engine.command_line.app import (
     run_at,
     write_reports,
 )
-from mc_engine.command_line.next_step import MERGE
+from mc_engine.command_line.next_step import MERGE, after_merge
 from mc_engine.interruption import advise
 from mc_engine.numbers_in_text import counted
 from mc_engine.shell_words import shell_word
@@ -121,7 +121,8 @@ def status(place: RunPlace) -> None:
         resume = f"resume RUN --publish {shell_word(place)}" if is_url(place) else f"resume {shell_word(place)}"
         recorded = 0 if is_url(place) else recorded_cases(store.path)
         flies = f"flies them but {recorded:,} whose rows are recorded" if recorded else "flies them"
-        typer.echo(f"missing   {ranges(missing)}; `mc-engine {resume}` {flies}")
+        advice = after_merge(folder) or f"`mc-engine {resume}` {flies}"
+        typer.echo(f"missing   {ranges(missing)}; {advice}")
     elif lost := store.lost_files():
         leave(DAMAGED, f"{place}/{lost[0]}: is gone; `mc-engine verify {shell_word(place)}` names all damage")
     else:

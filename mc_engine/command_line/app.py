@@ -243,14 +243,15 @@ def refuse_occupied_folder(path: Path, option: str = "--out ") -> None:
 
     option : what the sentence begins with; empty where the folder is an argument
     """
+    from mc_engine.command_line.next_step import after_merge
     from mc_engine.store.opening import open_store
     from mc_engine.store.run_files import JOURNAL, RUN, is_run_directory, kind_of
     from mc_engine.store.store import refuse_occupied
     from mc_engine.store.writer_lock import LOCK_NAME
 
     if (path / JOURNAL).exists() and is_run_directory(path) and open_store(path).missing():
-        resume = f"`mc-engine resume {shell_word(path)}`"
-        leave(USAGE, f"{option}{path}: holds a run that is not complete; {resume} flies the rest")
+        advice = after_merge(path) or f"`mc-engine resume {shell_word(path)}` flies the rest"
+        leave(USAGE, f"{option}{path}: holds a run that is not complete; {advice}")
     # With a lock file and no journal, a creation was interrupted; `create_store` knows which files it may have left.
     complete = (path / JOURNAL).exists() or kind_of(path) not in (None, RUN)
     if complete or not (path / LOCK_NAME).exists():

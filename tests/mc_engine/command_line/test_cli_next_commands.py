@@ -189,6 +189,9 @@ def test_a_merge_that_breaks_off_is_begun_again_and_not_flown(here, monkeypatch,
     with monkeypatch.context() as patch:
         patch.setattr("mc_engine.runner.shards._write_part", breaks_off)
         fails_with(4, call("merge", "whole", *shards), "remove whole and run the same `mc-engine merge` again")
+        assert "; remove whole and run the same `mc-engine merge` again" in call("status", "whole").output
+        again = ("run", "minimal", "--out", "whole")
+        fails_with(2, call(*again), "whole: holds a run that is not complete; remove whole and run the same `mc-engine")
     shutil.rmtree("whole")
     assert call("merge", "whole", *shards, "--no-report").exit_code == 0
 
