@@ -27,6 +27,8 @@ Outputs = outputs(
     osculating_inclination_deg="inclination of the osculating orbit",
 )
 OSCULATING = "osculating, at the last burn-out"
+CLOSED = "; no number if the orbit does not close"
+NAN = float("nan")
 Metrics = metrics(
     semi_major_axis_km=at_end("osculating_semi_major_axis_km", OSCULATING, low=0.0),
     eccentricity=at_end("osculating_eccentricity", OSCULATING, low=0.0, unit=""),
@@ -34,12 +36,18 @@ Metrics = metrics(
     plane_error_deg=Field("angle between the orbit's plane and the one aimed at", low=0.0),
     node_deg="right ascension of the ascending node, from the parking orbit's nominal node",
     perigee_radius_km=Field(OSCULATING, low=0.0),
-    apogee_radius_km=Field(OSCULATING, low=0.0),
+    apogee_radius_km=Field(OSCULATING + CLOSED, sometimes=True, low=0.0),
     radius_error_km="distance at the last burn-out less that of the final circle",
-    longitude_drift_deg_day="drift of the longitude, eastward, relative to the final circle",
-    in_plane_correction_m_s=Field("two apsidal impulses to the final circle, in the order that needs less", low=0.0),
+    longitude_drift_deg_day=Field(
+        "drift of the longitude, eastward, relative to the final circle" + CLOSED, sometimes=True
+    ),
+    in_plane_correction_m_s=Field(
+        "two apsidal impulses to the final circle, in the order that needs less" + CLOSED, sometimes=True, low=0.0
+    ),
     plane_correction_m_s=Field("one impulse at the node, into the plane of the final circle", low=0.0),
-    correction_dv_m_s=Field("root sum square of the in-plane and the plane correction", low=0.0),
+    correction_dv_m_s=Field(
+        "root sum square of the in-plane and the plane correction" + CLOSED, sometimes=True, low=0.0
+    ),
     propellant_kg=Field("propellant used", low=0.0),
     propellant_margin_kg="propellant on board less propellant used",
     final_mass_kg=at_end("mass_kg", "mass at the last burn-out", low=0.0),
@@ -95,20 +103,20 @@ def _two_impulses(r, other, target):
 
 @physics
 def evaluate(t, s, m, p, o):
-    """Metrics of a case, SI and radians; an orbit that does not close has no correction.
+    """Metrics of a case, SI and radians; an orbit that does not close has no apogee, drift and correction.
 
     The plane is corrected by one impulse at the node, 2 v sin(i/2); drift: sqrt(mu/a^3) less that of the final circle.
     """
     orbit, radius = orbit_of(s), o.final_radius
     closed = orbit.a > 0.0
     e = minimum(orbit.e, where(closed, 1.0 - 1e-12, orbit.e))
-    perigee, apogee = orbit.a * (1.0 - e), where(closed, orbit.a * (1.0 + e), 1e300)
+    perigee, apogee = orbit.a * (1.0 - e), where(closed, orbit.a * (1.0 + e), NAN)
     in_plane = minimum(_two_impulses(perigee, apogee, radius), _two_impulses(apogee, perigee, radius))
-    in_plane = where(closed, in_plane, 1e300)
+    in_plane = where(closed, in_plane, NAN)
     final = pole(o.final_inclination)
     tilt = atan2(norm(cross(orbit.h, final)), dot(orbit.h, final))
     plane = 2.0 * sqrt(MU_EARTH / radius) * sincos(0.5 * tilt)[0]
-    a = where(closed, orbit.a, 1e300)
+    a = where(closed, orbit.a, NAN)
     used, clock = p.mass - s.mass, t + p.ignition_delay_1
     return Metrics(
         plane_error=tilt,
@@ -119,7 +127,7 @@ def evaluate(t, s, m, p, o):
         longitude_drift=sqrt(MU_EARTH / a) / a - sqrt(MU_EARTH / radius) / radius,
         in_plane_correction=in_plane,
         plane_correction=plane,
-        correction_dv=where(closed, sqrt(minimum(in_plane, 1e100) * minimum(in_plane, 1e100) + plane * plane), 1e300),
+        correction_dv=sqrt(in_plane * in_plane + plane * plane),
         propellant=used,
         propellant_margin=o.propellant_limit - used,
         burn_out_1=m.burn_out_1 + p.ignition_delay_1,

@@ -5,6 +5,7 @@ import pytest
 
 from mc_engine import load_campaign
 from mc_engine.campaign.search import list_campaigns
+from mc_engine.flight.flight import chosen_cases
 from mc_engine.model import load_model
 from mc_engine.model.preparation import prepare
 from reports.run.history_bands import OUTER, outer_percentile
@@ -63,3 +64,31 @@ def test_what_is_prepared_for_a_case_has_the_same_bits_alone_and_among_others(mo
         alone = prepare(loaded, one, 1)
         for name, own, among in zip(names, alone.parameters[:, 0], together.parameters[:, case], strict=True):
             assert name in PLACES or own.tobytes() == among.tobytes(), (case, name, own, among)
+
+
+WIDE_ERRORS = {"thrust_factor": [0.6, 0.9, 1.2, 1.3], "initial_mass_factor": [0.75, 0.9, 1.5]}  # some escape
+
+
+@pytest.mark.parametrize(
+    ("model", "given", "more"),
+    [("campaigns.deorbit", {"ve_pct": -12.0, "oe_pct": 7.0}, {}), ("campaigns.geo_injection", {}, WIDE_ERRORS)],
+)
+def test_a_metric_without_a_number_in_a_completed_case_is_declared_so(model, given, more):
+    """Each parameter at its ends; a number as large as 1e100 stands for one that there is not."""
+    loaded = load_model(model)
+    ends = {item.name: [end for end in (item.low, item.high) if np.isfinite(end)] for item in loaded.parameters}
+    trials = [(name, value) for name, values in [*ends.items(), *more.items()] for value in values]
+    nominal = {item.name: item.default for item in loaded.parameters} | given
+    inputs = {name: np.full(len(trials), nominal[name]) for name, _ in trials}
+    for case, (name, value) in enumerate(trials):
+        inputs[name][case] = value
+    flown = chosen_cases(loaded, given | inputs)
+    done = flown["status"] == "ok"
+    assert done.sum() > 0.5 * len(trials)
+    undeclared = {
+        f"{metric.name} at {trials[case][0]} = {trials[case][1]:g}"
+        for metric in loaded.metrics
+        for case in np.flatnonzero(done)
+        if not (metric.sometimes or np.isfinite(flown[metric.name][case])) or abs(flown[metric.name][case]) > 1e100
+    }
+    assert undeclared == set()
