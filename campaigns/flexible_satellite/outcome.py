@@ -57,7 +57,10 @@ Metrics = metrics(
     min_pulse_s=Field("shortest pulse of any modulator; none for an ideal actuator", sometimes=True, low=0.0),
     **{f"pulse_count_{axis}": at_end(f"pulse_count_{axis}", f"pulses about {axis}", unit="") for axis in AXES},
     **{f"min_pulse_{axis}_s": Field(f"shortest pulse about {axis}", sometimes=True) for axis in AXES},
-    **{f"on_time_{axis}_s": f"time that the {axis} thrusters fired" for axis in AXES},
+    **{
+        f"on_time_{axis}_s": Field(f"time that the {axis} thrusters fired; no number without thrust", sometimes=True)
+        for axis in AXES
+    },
     **{f"impulse_{axis}_n_m_s": f"integral of the torque magnitude of the {axis} actuator" for axis in AXES},
     **{f"propellant_{axis}_kg": f"propellant for the impulse of the {axis} actuator" for axis in AXES},
     propellant_kg=Field("propellant for the impulse of all actuators", low=0.0),

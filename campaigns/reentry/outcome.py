@@ -77,7 +77,10 @@ Metrics = metrics(
     relative_speed_m_s=Field("speed over ground at entry", low=0.0),
     relative_flight_path_angle_deg="flight-path angle over ground at entry",
     ballistic_coefficient_kg_m2=Field(
-        "mass over drag area in hypersonic flow, errors included", low=0.0, unit="kg/m^2"
+        "mass over drag area in hypersonic flow, errors included; no number without drag",
+        sometimes=True,
+        low=0.0,
+        unit="kg/m^2",
     ),
 )
 Ground = namedtuple("Ground", "latitude longitude downrange crossrange flight_path_angle heading")  # outputs

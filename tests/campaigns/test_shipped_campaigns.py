@@ -66,13 +66,15 @@ def test_what_is_prepared_for_a_case_has_the_same_bits_alone_and_among_others(mo
             assert name in PLACES or own.tobytes() == among.tobytes(), (case, name, own, among)
 
 
+WITH_THRUSTERS = {"duration_s": 20.0, "actuator": "pwpf"}
 WIDE_ERRORS = {"thrust_factor": [0.6, 0.9, 1.2, 1.3], "initial_mass_factor": [0.75, 0.9, 1.5]}  # some escape
 
 
 @pytest.mark.parametrize(
     ("model", "given", "more"),
-    [("campaigns.deorbit", {"ve_pct": -12.0, "oe_pct": 7.0}, {}), ("campaigns.geo_injection", {}, WIDE_ERRORS)],
-)
+    [("campaigns.deorbit", {"ve_pct": -12.0, "oe_pct": 7.0}, {}), ("campaigns.flexible_satellite", WITH_THRUSTERS, {}),
+     ("campaigns.geo_injection", {}, WIDE_ERRORS), ("campaigns.reentry", {}, {})],
+)  # fmt: skip
 def test_a_metric_without_a_number_in_a_completed_case_is_declared_so(model, given, more):
     """Each parameter at its ends; a number as large as 1e100 stands for one that there is not."""
     loaded = load_model(model)
