@@ -14,8 +14,8 @@ from mc_engine.physics import frames
 # The planet of each case and its exponential atmosphere; float64[n], SI.  gravity: at the ground
 World = namedtuple("World", "mu radius polar_radius e2 rate gravity log_density inverse_scale temperature")
 # The first state of each case with its errors, and the entry as it was planned without them; float64[n], SI.
-# position, velocity: [3, n], planet-fixed, over ground (flat: ahead, left, up);  speed, path: over ground
-Entry = namedtuple("Entry", "position velocity speed path planned")
+# position, velocity: [3, n], planet-fixed, over ground (flat: ahead, left, up);  altitude, speed, path: over ground
+Entry = namedtuple("Entry", "position velocity altitude speed path planned")
 # place, ahead, right: unit vectors [3, n], to the entry, along its great circle, to its right;  altitude, r, latitude:
 # where;  speed, path, heading: over ground
 Planned = namedtuple("Planned", "place ahead right altitude r latitude speed path heading")
@@ -51,11 +51,13 @@ def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusa
         north, east, up = frames.velocity_components(speed, path, heading) - carried
         return north, east, up, np.sqrt(north**2 + east**2 + up**2), np.arctan2(up, np.hypot(north, east))
 
+    def above_ground(radius, latitude):
+        """Geodetic altitude [m] at a distance from the centre."""
+        return frames.over_ellipsoid(radius, 1.0 / radius, np.sin(latitude) ** 2, world.polar_radius, world.e2)[0]
+
     radius = frames.radius_at_altitude(i.entry_altitude, i.entry_latitude, world.polar_radius, world.e2)
     radius = np.where(i.entry_radius > 0.0, i.entry_radius, radius)
-    sin2 = np.sin(i.entry_latitude) ** 2
-    altitude, _ = frames.over_ellipsoid(radius, 1.0 / radius, sin2, world.polar_radius, world.e2)
-    altitude = np.where(i.entry_radius > 0.0, altitude, i.entry_altitude)
+    altitude = np.where(i.entry_radius > 0.0, above_ground(radius, i.entry_latitude), i.entry_altitude)
     in_frame, path_in_frame = _arrival(i, settings, world, radius, refusals)
     latitude, longitude = i.entry_latitude, i.entry_longitude
     north, east, _, speed, path = over_ground(in_frame, path_in_frame, i.entry_heading, radius, latitude)
@@ -80,7 +82,7 @@ def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusa
     # minus zero would fly to other bits than zero does
     position = np.where(flat, [zero, zero, radius - world.polar_radius], radius * place) + 0.0
     velocity = np.where(flat, [flat_ahead, -flat_right, up], north * to_north + east * to_east + up * place) + 0.0
-    return Entry(position, velocity, speed, path, planned)
+    return Entry(position, velocity, above_ground(radius, latitude), speed, path, planned)
 
 
 def _arrival(i: SimpleNamespace, settings: SimpleNamespace, world: World, radius: np.ndarray, refusals: Refusals):

@@ -28,6 +28,7 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
     airframe = airframe_of(inputs, settings, refusals)
     altitude = entry.planned.altitude
     refusals.add(altitude <= inputs.stop_altitude, "the entry is not above stop_altitude_km")
+    refusals.add(entry.altitude <= inputs.stop_altitude, "the entry with its errors is not above stop_altitude_km")
     plan = plans_of(inputs, settings, world, planned, airframe)
     guided = settings.guidance != CHOICES.guidance.none
     refusals.add(guided & ~(plan.lift_to_drag > 0.0), "a guidance law needs a vehicle with lift")

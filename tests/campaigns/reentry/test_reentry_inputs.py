@@ -131,6 +131,7 @@ REFUSED = [
         'mass_kg is that of the vehicle "apollo"; for another, set vehicle = "given"',
     ),
     ({"entry_altitude_km": 9.0}, "the entry is not above stop_altitude_km"),
+    ({"entry_altitude_error_km": -111.0}, "the entry with its errors is not above stop_altitude_km"),
     ({"arrival": "hyperbola", "vacuum_periapsis_km": 130.0}, "the vacuum periapsis lies above the entry altitude"),
     ({"guidance": "law1", "vehicle": "soyuz"}, "a guidance law needs a vehicle with lift"),
     (
