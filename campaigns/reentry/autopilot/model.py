@@ -15,6 +15,7 @@ from campaigns.reentry.autopilot.lead_compensator import Compensator, Response, 
 from campaigns.reentry.guidance.plan import plan_of
 from campaigns.reentry.guidance.reference import SPEED, fly_reference
 from campaigns.reentry.guidance.reference_table import between_rows
+from mc_engine.errors import ModelError
 from mc_engine.lanes import floor, look_up, look_up_record, maximum, merged, minimum, physics, replace, sqrt, where
 from mc_engine.model import (
     Field,
@@ -121,6 +122,11 @@ def pitch_design(o: Any, pressure: float) -> tuple[Response, float, Compensator]
     """
     stiffness = -pressure * o.area * o.diameter * o.c_m_alpha / o.inertia_pitch
     plant, gain = short_period(stiffness), o.bandwidth**2 + stiffness
+    if gain <= -stiffness:  # the loop would not even hold the angle against the air
+        raise ModelError(
+            f"at a dynamic pressure of {pressure:.0f} Pa the capsule is too unstable for these loops: give a lower "
+            "c_m_alpha, which is negative if stable, or more bandwidth_rad_s"
+        )
     return plant, gain, design_lead(plant, gain, o.phase_margin)
 
 

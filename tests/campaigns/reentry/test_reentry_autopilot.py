@@ -19,6 +19,7 @@ from campaigns.reentry.autopilot.model import (
     planned_profile,
 )
 from campaigns.reentry.published.values import ogata_plant
+from mc_engine.errors import ModelError
 from mc_engine.flight.flight import fly_history, prepare, settings_of
 from tests.campaigns.model_flights import ModelFlights
 
@@ -34,6 +35,12 @@ def o():
 
 
 # ---- design
+
+
+def test_a_capsule_that_the_loops_cannot_hold_is_rejected_and_a_less_unstable_one_flies():
+    with pytest.raises(ModelError, match="Pa the capsule is too unstable for these loops: give a lower c_m_alpha"):
+        fly_one(c_m_alpha=0.01)
+    assert fly_one(c_m_alpha=0.001)["peak_alpha_deg"] < 3.0
 
 
 @pytest.fixture(scope="module")
