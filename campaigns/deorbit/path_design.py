@@ -44,6 +44,7 @@ def design_path(i: SimpleNamespace, ascending: np.ndarray, refusals: Refusals) -
     p = a * (1.0 - e**2)  # eq. (7)
     cos_f = (p / a_initial - 1.0) / e  # eq. (17) with e_i = 0
     refusals.add(~(np.abs(cos_f) <= 1.0), "the initial orbit and the path to the entry state do not intersect")
+    refusals.add(~(angle > 0.0), "the path is level at entry: it touches the interface and does not fall through it")
     f_burn = np.where(ascending, np.arccos(cos_f), TURN - np.arccos(cos_f))
     v_initial = np.sqrt(MU_EARTH / a_initial)  # eq. (19)
     v_radial = np.sqrt(MU_EARTH / p) * e * np.sin(f_burn)

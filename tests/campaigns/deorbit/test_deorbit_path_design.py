@@ -139,3 +139,9 @@ def test_a_burn_that_never_fires_leaves_an_uncontrolled_craft_in_orbit():
     row = fly_one(ve_pct=-100.0, control="off")
     assert row["status"] == "no-stop"
     assert row["end_time_s"] == 3000.0
+
+
+def test_a_path_that_is_level_at_entry_is_refused_and_one_that_hardly_falls_is_flown():
+    level, falling = (fly_one(target_speed_m_s=7920.0, target_flight_path_angle_deg=angle) for angle in (0.0, 0.01))
+    assert level["reason"] == "the path is level at entry: it touches the interface and does not fall through it"
+    assert falling["entry_flight_path_angle_deg"] == pytest.approx(-0.01, rel=1e-6)
