@@ -37,7 +37,10 @@ _BY_QUANTITY: dict[str, dict[str, float]] = {
     "area": {"m^2": 1.0, "cm^2": 1e-4, "km^2": 1e6},
     "volume": {"m^3": 1.0, "cm^3": 1e-6},
     "curvature": {"1/m": 1.0, "1/km": 1e-3},
-    "speed": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "km/s": 1e3, "m/day": 1.0 / _DAY, "km/day": 1e3 / _DAY},
+    "speed": {
+        "m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "km/s": 1e3, "km/h": 1.0 / 3.6, "m/day": 1.0 / _DAY,
+        "km/day": 1e3 / _DAY,
+    },
     "acceleration": {"m/s^2": 1.0, "mm/s^2": 1e-3, "g": _G0, "ug": 1e-6 * _G0},
     "jerk": {"m/s^3": 1.0},
     "velocity random walk": {"m/s/sqrt(s)": 1.0, "m/s/sqrt(h)": 1.0 / 60.0},
@@ -99,6 +102,12 @@ _LONGEST_ENDING = 5  # words of a unit at the end of a name, as in _n_m_s or _de
 _ALSO_WRITTEN = str.maketrans(
     {"²": "2", "³": "3", "µ": "u", "μ": "u", "°": "deg", "Ω": "ohm"} | dict.fromkeys(" ^*·()_")
 )
+# Of quotients that no unit is: words of the numerators, by the quantity of the denominator, as in _kg_h and _g_cm3.
+_NUMERATORS = {
+    "time": {"um", "mm", "cm", "m", "km", "ft", "mi", "nmi", "mg", "g", "ug", "kg", "lb", "mrad", "rad", "deg",
+             "arcmin", "arcsec", "rev"},
+    "volume": {"mg", "g", "ug", "kg", "lb"},
+}  # fmt: skip
 OTHER_SUFFIXES = {"%": "_pct", "day": "_days"}  # of units that a column's name does not end in letter by letter
 
 
@@ -178,6 +187,11 @@ def unit_of(name: str, said: Callable[[str], str] = 'unit="{}"'.format) -> str:
         return units[0]
     if units:
         raise ModelError(f'"{name}" may end in the unit {" or ".join(units)}; say which, {said(units[0])}')
+    if quotient := _unknown_quotient(name):
+        raise ModelError(
+            f'"{name}" ends in {"/".join(quotient)}, which is no unit here: convert it, or say {said(quotient[1])} if '
+            f"it is in {quotient[1]}; `mc-engine units` lists all"
+        )
     alike = _alike(name)
     ending = f'; did you mean "{alike}"?' if alike else ""
     raise ModelError(
@@ -195,8 +209,19 @@ def units_meant(name: str) -> list[str]:
     return units
 
 
+def _unknown_quotient(name: str) -> tuple[str, str] | None:
+    """(numerator, unit) where a name ends in a quotient that no unit is, such as _kg_h; or None."""
+    unit = max(_units_by_ending(name), key=lambda one: len(unit_suffix(one)), default="")
+    before = name.removesuffix(unit_suffix(unit)).rpartition("_")[2]
+    return (before, unit) if before in _NUMERATORS.get(UNITS[unit].quantity, ()) else None
+
+
 def units_at_the_end(name: str) -> list[str]:
-    """Every unit that a column's name may end in."""
+    """Every unit that a column's name may end in; none of speed_ft_s, which is no time."""
+    return [] if _unknown_quotient(name) else _units_by_ending(name)
+
+
+def _units_by_ending(name: str) -> list[str]:
     return [unit for unit in UNITS if unit and name.endswith(unit_suffix(unit)) and name != unit_suffix(unit)]
 
 

@@ -56,14 +56,14 @@ def test_the_unit_that_was_meant_is_found(written, meant):
     ("name", "meant"),
     [("h_mtr", "h_m"), ("h_mtrs", "h_m"), ("h_kmm", "h_km"), ("t_secs", "t_s"), ("t_msec", "t_ms"), ("t_hrs", "t_h"),
      ("t_minutes", "t_min"), ("p_kpas", "p_kpa"), ("n_rpms", "n_rpm"), ("angle_dge", "angle_deg"),
-     ("angle_arcsc", "angle_arcsec"), ("k_w_m2k", "k_w_m2_k")],
+     ("angle_arcsc", "angle_arcsec"), ("k_w_m2k", "k_w_m2_k"), ("wind_kmh", "wind_km_h")],
 )  # fmt: skip
 def test_a_misspelt_ending_is_answered_with_the_unit_that_was_meant(name, meant):
     with pytest.raises(ModelError, match=f'did you mean "{meant}"'):
         unit_of(name)
 
 
-@pytest.mark.parametrize("ending", ["kmh", "kph", "kts", "mach", "gm", "mbar", "m3s", "mm2", "dgr", "lbs", "psi"])
+@pytest.mark.parametrize("ending", ["kph", "kts", "mach", "gm", "mbar", "m3s", "mm2", "dgr", "lbs", "psi"])
 def test_the_unit_of_another_quantity_is_no_answer_to_an_ending_like_it(ending):
     with pytest.raises(ModelError) as caught:
         unit_of(f"x_{ending}")
@@ -77,3 +77,20 @@ def test_an_unknown_unit_is_answered_with_the_command_that_lists_them():
     lines = [line.split("  ") for line in listed.splitlines()]
     assert ["torque", "N m, uN m, mN m, kN m"] in [[one[0], one[-1].strip()] for one in lines]
     assert "Two end otherwise: _pct for %, _days for day\n" in listed
+
+
+@pytest.mark.parametrize(
+    ("name", "quotient", "unit"),
+    [("flow_kg_h", "kg/h", "h"), ("speed_ft_s", "ft/s", "s"), ("climb_m_min", "m/min", "min"),
+     ("density_g_cm3", "g/cm^3", "cm^3"), ("turn_rev_s", "rev/s", "s")],
+)  # fmt: skip
+def test_a_quotient_that_no_unit_is_is_not_taken_for_its_denominator(name, quotient, unit):
+    with pytest.raises(ModelError) as caught:
+        unit_of(name)
+    assert f'"{name}" ends in {quotient}, which is no unit here' in str(caught.value)
+    assert f'say unit="{unit}" if it is in {unit}' in str(caught.value)
+
+
+def test_kilometres_an_hour_are_a_speed():
+    assert unit_of("wind_km_h") == "km/h"
+    assert convert(36.0, "km/h", "m/s") == pytest.approx(10.0, rel=1e-15)
