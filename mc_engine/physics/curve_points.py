@@ -55,6 +55,13 @@ def si_factor(name: str, unit: str | None = None, said: Callable[[str], str] = s
     return factors.pop() if len(factors) == 1 else UNITS[unit_of(name, said)].factor
 
 
+def refuse_other_quantity(path: Path, name: str, quantity: str) -> None:
+    """ModelError for a column whose name ends in a unit of another quantity; a single word has no unit."""
+    units = [] if name.isalnum() else units_meant(name)
+    if units and quantity not in {UNITS[unit].quantity for unit in units}:
+        raise ModelError(f'{path.name}: "{name}" ends in {units[0]}, no unit of {quantity}; see `mc-engine units`')
+
+
 def _csv(path: Path) -> dict[str, np.ndarray]:
     """Columns by the names in the first line; lines that are empty or begin with # count for nothing."""
     try:

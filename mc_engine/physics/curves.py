@@ -36,6 +36,7 @@ from mc_engine.physics.curve_points import (
     path_beside_caller,
     previous_cells,
     previous_rows,
+    refuse_other_quantity,
     refuse_points,
     turnovers,
 )
@@ -134,6 +135,9 @@ def wind_profile(
     wanted = [name for name in (altitude, north, east, speed, coming_from) if name]
     if len(wanted) != 3 or bool(north) != bool(east):
         raise ModelError("a wind has the columns north and east, or speed and coming_from")
+    second = "speed" if north else "angle"
+    for name, quantity in zip(wanted, ("length", "speed", second), strict=True):
+        refuse_other_quantity(path, name, quantity)
     by_name = dict.fromkeys(wanted, lambda unit: "by another name" if unit else "its unit at its end, or one word,")
     h, *pair = (columns_of(path, dict.fromkeys(wanted), by_name)[name] for name in wanted)
     components = pair if north else [-pair[0] * np.cos(pair[1]), -pair[0] * np.sin(pair[1])]

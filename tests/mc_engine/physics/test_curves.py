@@ -327,3 +327,15 @@ def test_the_argument_that_says_a_unit_is_named_as_the_function_has_it(folder):
         surface("points.csv", "time_sec", "alpha_x", "cd", units={"time_sec": "s"})
     with pytest.raises(ModelError, match="; say its unit at its end, or one word, for a plain number"):
         wind_profile("points.csv", "time_sec", "alpha_x", "cd")
+
+
+@pytest.mark.parametrize(
+    ("columns", "wrong", "ends", "quantity"),
+    [(("h_km", "from_deg", "wind_kn"), "wind_kn", "kN", "speed"), (("t_s", "from_deg", "v_m_s"), "t_s", "s", "length"),
+     (("h_km", "v_m_s", "w_m_s"), "v_m_s", "m/s", "angle")],
+)  # fmt: skip
+def test_a_wind_column_in_a_unit_of_another_quantity_is_rejected(columns, wrong, ends, quantity, tmp_path):
+    path = tmp_path / "wind.csv"
+    path.write_text(f"{','.join(columns)}\n0,10,5\n9,20,8\n")
+    with pytest.raises(ModelError, match=f'"{wrong}" ends in {ends}, no unit of {quantity}'):
+        wind_profile(str(path), columns[0], speed=columns[2], coming_from=columns[1])
