@@ -15,7 +15,7 @@ from reports.run.flown import Flown
 from reports.text.numbers import count
 
 INSIDE, OUTSIDE, FAILED = 0, 1, 2
-ALL_LIMITS, COMPLETED = "inside all limits", "completed"
+ALL_LIMITS, COMPLETED, NOT_COMPLETED = "inside all limits", "completed", "failed"
 
 
 def inside(flown: Flown, verdicts: Sequence[Verdict] | None = None) -> np.ndarray:
@@ -55,7 +55,7 @@ def case_outcomes(flown: Flown) -> np.ndarray:
 
 def outcome_names(flown: Flown) -> tuple[str, str, str]:
     """The words for the three outcomes; without a requirement, nothing can be outside."""
-    return inside_words(flown), "outside a limit", "failed"
+    return inside_words(flown), "outside a limit", NOT_COMPLETED
 
 
 def outcome_sentence(flown: Flown) -> str:

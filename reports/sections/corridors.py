@@ -12,7 +12,7 @@ from reports.document.blocks import FigureBlock, Table
 from reports.drawing.marks import Line, Points
 from reports.figures.clouds import LIMIT_SETS, case_scatter, outline
 from reports.run.flown import Flown
-from reports.run.outcomes import inside, inside_words
+from reports.run.outcomes import NOT_COMPLETED, inside, inside_words
 from reports.sections.figure_blocks import nominal_rings, thinned_rows
 from reports.sections.tables import limit_text
 from reports.text.numbers import count
@@ -41,7 +41,8 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
         return f"{figure.title}: not drawn; {flown.absence(figure.x, figure.y) or lacking}."
     if reason := flown.unsquarable(figure.x, figure.y):
         return f"{figure.title}: not drawn; {reason}."
-    words, member = _classes([verdict.name for verdict in verdicts], violated, inside_words(flown, verdicts))
+    names = [verdict.name for verdict in verdicts]
+    words, member = _classes(names, violated, ~flown.ok, inside_words(flown, verdicts))
     # every violation stays in the picture, as far as there is room
     rows = thinned_rows(used, np.flatnonzero(violated.any(axis=0))[: len(used) // 2 if used.size < 4000 else 2000])
     limits = tuple(_limit_lines(flown, figure, verdicts))
@@ -65,15 +66,19 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
     return FigureBlock(f"{figure.title}.{said}{lost}", drawing, "wide")
 
 
-def _classes(names: list[str], violated: np.ndarray, inside_all: str) -> tuple[list[str], np.ndarray]:
+def _classes(
+    names: list[str], violated: np.ndarray, failed: np.ndarray, inside_all: str
+) -> tuple[list[str], np.ndarray]:
     """Words of the classes, and the class of each case: inside, then the sets of limits violated, most frequent first.
 
-    violated : bool[n_requirements, n_held].  What is too rare for a colour of its own shares the last one.
+    violated : bool[n_requirements, n_held].  What is too rare for a colour of its own shares one.
+    failed : bool[n_held].  These come last: they have no numbers that could be beyond a limit.
     """
-    code = (violated * (1 << np.arange(len(names)))[:, None]).sum(axis=0)
+    code = np.where(failed, 0, (violated * (1 << np.arange(len(names)))[:, None]).sum(axis=0))
     sets, cases = np.unique(code[code > 0], return_counts=True)
     ordered = sets[np.lexsort((sets, -cases))].tolist()
-    own = ordered if len(ordered) < MOST_CLASSES else ordered[: MOST_CLASSES - 2]
+    most = MOST_CLASSES - 1 - int(failed.any())
+    own = ordered if len(ordered) <= most else ordered[: most - 1]
     words = [inside_all]
     member = np.zeros(code.size, dtype=np.int64)
     for k, limits in enumerate(own, start=1):
@@ -82,6 +87,9 @@ def _classes(names: list[str], violated: np.ndarray, inside_all: str) -> tuple[l
     if len(own) < len(ordered):
         words.append("beyond other sets of limits")
         member[(code > 0) & (member == 0)] = len(words) - 1
+    if failed.any():
+        words.append(NOT_COMPLETED)
+        member[failed] = len(words) - 1
     return words, member
 
 
