@@ -65,10 +65,15 @@ def _differs(values: np.ndarray) -> bool:
 
 
 def _outcome_variance(values: np.ndarray, lost: np.ndarray) -> float:
-    """Variance of the share of lost cases over bins of equally many values: also where both ends are lost."""
+    """Variance of the share of lost cases over bins of equally many values: also where both ends are lost.
+
+    Each case counts as the share lost of all that have its value: a bin may end among equal values, where the order is
+    that of the design, such as of another input's levels.
+    """
     finite = np.isfinite(values)
-    order = np.argsort(values[finite], kind="stable")
-    return float(np.var([part.mean() for part in np.array_split(lost[finite][order], BINS) if part.size]))
+    _, place, cases = np.unique(values[finite], return_inverse=True, return_counts=True)
+    share = (np.bincount(place, lost[finite]) / cases)[np.sort(place)]
+    return float(np.var([part.mean() for part in np.array_split(share, BINS) if part.size]))
 
 
 # ---- what the page looks up

@@ -6,6 +6,7 @@ from synthetic_run import synthetic_run
 
 from reports.run.flown import Flown
 from reports.run.outcomes import COMPLETED, case_outcomes, failures, inside, inside_words, outcome_sentence
+from reports.sections.single_cases import case_axes
 
 
 def flown(failed, outside):
@@ -46,3 +47,14 @@ def test_cases_are_named_by_the_requirements_that_they_are_inside_of():
     assert (inside_words(run), inside_words(run, [speed])) == ("inside all limits", "inside the limit of speed")
     bare = Flown(synthetic_run(300, 3, requirements=[]), "run")
     assert outcome_sentence(bare) == "297 completed, 3 failed, of 300 cases"
+
+
+def test_the_levels_of_a_grid_that_change_no_outcome_are_no_axis_of_the_figure_by_outcome():
+    """Of the cases with one level of it, those come first that have the lowest level of another input."""
+    run = synthetic_run(80, 0)
+    first, second, third = (level.ravel() for level in np.meshgrid(*map(np.arange, (8, 5, 2)), indexing="ij"))
+    run.table = run.table.assign(ve_pct=1.0 * first, oe_pct=1.0 * second, idle_pct=1.0 * third)
+    run.table["propellant_kg"] = 1.0 * first + 0.5 * second
+    run.manifest["columns"].append({**run.manifest["columns"][3], "name": "idle_pct"})
+    run.manifest["requirements"] = [{**run.manifest["requirements"][0], "at_most": 6.5}]
+    assert case_axes(Flown(run, "run")) == ("ve_pct", "oe_pct")
