@@ -42,15 +42,21 @@ def histogram(
     counts = np.histogram(values, edges)[0]
     curve = _normal_curve(normal, values.size * (edges[1] - edges[0])) if normal else np.empty((2, 0))
     top = 1.06 * max([float(counts.max()), *curve[1]])
-    drawn = _quantiles_within(summary, (0.5, *outer), edges)
+    quantiles = [quantile for p in (0.5, *outer) if (quantile := summary.at(p)) is not None]
+    drawn = [quantile for quantile in quantiles if edges[0] <= quantile.value <= edges[-1]]
     texts = [
         f"{number(a)} to {number(b)}: {count(int(n))} cases" for (a, b), n in zip(pairwise(edges), counts, strict=True)
     ]
-    marks: list[Mark] = [_bounds(drawn, summary.confidence, top)] * with_intervals
+    marks: list[Mark] = [_bounds(drawn, summary.confidence, top, edges)] * with_intervals
     bottom = np.zeros(counts.size)
     marks.append(Bar(edges[:-1], edges[1:], bottom, counts, SKY, texts=texts, column=column, key="cases"))
     marks += _percentile_lines(drawn, outer, with_intervals)
     beyond = [counted(values.size - int(counts.sum()), "case")] if counts.sum() < values.size else []
+    beyond += [
+        f"{given_percent(quantile.probability)} percentile {number(quantile.value)}"
+        for quantile in quantiles
+        if quantile not in drawn
+    ]
     known = [] if nominal is None else [nominal]
     for places, words, key, colour, dash in (
         (known, "nominal", "nominal", INK, "dot"), (limits, "limit", "required limit", VERMILION, "solid"),
@@ -83,17 +89,10 @@ def _normal_curve(normal: tuple[float, float], cases_times_width: float) -> np.n
     return np.array([normal[0] + normal[1] * z, cases_times_width * density])
 
 
-def _quantiles_within(summary: Summary, probabilities: Sequence[float], edges: np.ndarray) -> list[Quantile]:
-    """The quantiles with no part outside a range that was cut; the others are in the table."""
-    known = [quantile for p in probabilities if (quantile := summary.at(p)) is not None]
-    low, high = edges[[0, -1]]
-    return [q for q in known if all(end is None or low <= end <= high for end in (q.value, q.lower, q.upper))]
-
-
-def _bounds(quantiles: Sequence[Quantile], confidence: float, top: float) -> Bar:
-    """Intervals of the quantiles, as high as the panel."""
+def _bounds(quantiles: Sequence[Quantile], confidence: float, top: float, edges: np.ndarray) -> Bar:
+    """Intervals of the quantiles, as high as the panel, as far as the bins go."""
     ends = [(q.lower, q.upper) for q in quantiles if q.lower is not None and q.upper is not None]
-    left, right = np.array(ends).reshape(-1, 2).T
+    left, right = np.array(ends).reshape(-1, 2).clip(edges[0], edges[-1]).T
     key = (
         f"{given_percent(0.5 * (1.0 + confidence))} confidence bounds of a percentile, distribution-free"
         if ends

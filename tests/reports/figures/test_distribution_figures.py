@@ -5,8 +5,9 @@ import pytest
 
 from mc_engine.statistics import summarize
 from reports.drawing import paper, screen
-from reports.drawing.marks import Bar
+from reports.drawing.marks import Bar, Limit
 from reports.figures.distributions import histogram, histograms, shown_range
+from reports.text.numbers import given_percent, number
 
 OUTER = (0.00135, 0.99865)
 
@@ -79,6 +80,23 @@ def test_a_few_far_cases_do_not_squeeze_the_rest_and_are_counted():
     assert bins(found)[1].sum() == 10_000 - 3
     assert np.count_nonzero(bins(found)[1]) > 20
     assert told(found) == "3 cases beyond the axis"
+
+
+def test_a_percentile_stays_in_a_histogram_whose_tail_is_cut_and_one_beyond_the_axis_is_told():
+    """Of a metric with a long tail, the upper bound of the outer percentile is among the cases that are cut off."""
+    values = np.random.Generator(np.random.Philox(key=4)).standard_t(1.5, 2000)
+    summary = summarize(values, probabilities=(0.005, 0.5, 0.995, 0.9995))
+    end = shown_range(values)[1]
+    found = histogram(values, "peak [N]", summary, (0.005, 0.995, 0.9995), title="all", with_intervals=True)
+    within, cut = summary.at(0.995), summary.at(0.9995)
+    assert within.value < end < within.upper
+    assert end < cut.value
+    lines = [mark.at for mark in found.marks if isinstance(mark, Limit)]
+    assert sorted(lines) == [summary.at(p).value for p in (0.005, 0.5, 0.995)]
+    (bands,) = [mark for mark in found.marks if isinstance(mark, Bar) and "confidence" in mark.key]
+    assert (bands.left[2], bands.right[2]) == (within.lower, bins(found)[0][-1])
+    n = 2000 - int(bins(found)[1].sum())
+    assert told(found) == f"{n} cases, {given_percent(0.9995)} percentile {number(cut.value)} beyond the axis"
 
 
 def test_without_far_cases_all_are_shown_and_nothing_is_said():
