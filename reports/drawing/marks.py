@@ -14,7 +14,7 @@ import numpy as np
 
 from mc_engine.statistics.summary import nearly_equal
 from reports.drawing.palette import CIVIDIS, PAPER, blended
-from reports.text.numbers import number
+from reports.text.numbers import digits_within, number
 
 MARGIN = 0.04  # of an axis, beyond the marks on it
 FIELD_EDGE = "rgba(255,255,255,0.55)"  # between the regions of a field
@@ -130,7 +130,9 @@ class Field:
             (points,), (offsets,) = generator.filled(low, high)
             if points is not None:
                 x, y = joined(np.split(points, offsets[1:-1])).T
-                yield Band(x, y, colour, self.opacity, f"{self.label}: {number(low)} to {number(high)}", FIELD_EDGE)
+                digits = digits_within(float(self.levels[0]), float(self.levels[-1]))
+                text = f"{self.label}: {number(low, digits)} to {number(high, digits)}"
+                yield Band(x, y, colour, self.opacity, text, FIELD_EDGE)
 
 
 @dataclass(frozen=True)
@@ -263,7 +265,9 @@ class Plot:
         told += [(field.label, iter(field.z)) for field in self.fields]
         for name, values in told:
             if (numbers := finite(values)).size:
-                yield f"{name} {number(numbers.min(), 4)} to {number(numbers.max(), 4)}"
+                ends = float(numbers.min()), float(numbers.max())
+                low, high = (number(end, digits_within(*ends, least=4)) for end in ends)
+                yield f"{name} {low} to {high}"
 
     @property
     def fields(self) -> list[Field]:

@@ -1,6 +1,7 @@
 """Histograms with quantiles, their distribution-free intervals, the nominal, limits and printed distributions."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -9,7 +10,7 @@ from mc_engine.statistics import Quantile, Summary
 from mc_engine.statistics.summary import nearly_equal
 from reports.drawing.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot
 from reports.drawing.palette import BLUE, GREEN, INK, ORANGE, SKY, VERMILION
-from reports.text.numbers import count, counted, given_percent, interval, limit_number, number
+from reports.text.numbers import count, counted, digits_within, given_percent, interval, limit_number, number
 
 FEWEST_BINS, MOST_BINS = 8, 48
 CENTRAL = (0.005, 0.995)  # what a histogram must show well
@@ -44,16 +45,17 @@ def histogram(
     top = 1.06 * max([float(counts.max()), *curve[1]])
     quantiles = [quantile for p in (0.5, *outer) if (quantile := summary.at(p)) is not None]
     drawn = [quantile for quantile in quantiles if edges[0] <= quantile.value <= edges[-1]]
+    plain = partial(number, digits=digits_within(edges[0], edges[-1]))
     texts = [
-        f"{number(a)} to {number(b)}: {count(int(n))} cases" for (a, b), n in zip(pairwise(edges), counts, strict=True)
+        f"{plain(a)} to {plain(b)}: {count(int(n))} cases" for (a, b), n in zip(pairwise(edges), counts, strict=True)
     ]
     marks: list[Mark] = [_bounds(drawn, summary.confidence, top, edges)] * with_intervals
     bottom = np.zeros(counts.size)
     marks.append(Bar(edges[:-1], edges[1:], bottom, counts, SKY, texts=texts, column=column, key="cases"))
-    marks += _percentile_lines(drawn, outer, with_intervals)
+    marks += _percentile_lines(drawn, outer, with_intervals, digits_within(edges[0], edges[-1]))
     beyond = [counted(values.size - int(counts.sum()), "case")] if counts.sum() < values.size else []
     beyond += [
-        f"{given_percent(quantile.probability)} percentile {number(quantile.value)}"
+        f"{given_percent(quantile.probability)} percentile {plain(quantile.value)}"
         for quantile in quantiles
         if quantile not in drawn
     ]
@@ -61,7 +63,7 @@ def histogram(
     for places, words, key, colour, dash in (
         (known, "nominal", "nominal", INK, "dot"), (limits, "limit", "required limit", VERMILION, "solid"),
     ):  # fmt: skip
-        shown = number if key == "nominal" else limit_number
+        shown = plain if key == "nominal" else limit_number
         near = [at for at in places if _near(at, edges)]
         far = [shown(at) for at in places if at not in near]
         marks += [Limit(at, "x", colour, f"{key} {shown(at)}", dash, key=key) for at in near]
@@ -101,11 +103,13 @@ def _bounds(quantiles: Sequence[Quantile], confidence: float, top: float, edges:
     return Bar(left, right, np.zeros(left.size), np.full(left.size, top), BLUE, 0.3, key=key)
 
 
-def _percentile_lines(quantiles: Sequence[Quantile], outer: Sequence[float], with_intervals: bool) -> Iterator[Limit]:
+def _percentile_lines(
+    quantiles: Sequence[Quantile], outer: Sequence[float], with_intervals: bool, digits: int
+) -> Iterator[Limit]:
     both = f"{' and '.join(given_percent(p) for p in outer)} percentiles"
     for q in quantiles:
-        bounds = f" {interval(q.lower, q.upper)}" if with_intervals else ""
-        words = f"{given_percent(q.probability)} percentile {number(q.value)}{bounds}"
+        bounds = f" {interval(q.lower, q.upper, digits=digits)}" if with_intervals else ""
+        words = f"{given_percent(q.probability)} percentile {number(q.value, digits)}{bounds}"
         colour, dash, key = (ORANGE, "solid", "median") if q.probability == 0.5 else (BLUE, "dash", both)
         yield Limit(q.value, "x", colour, words, dash, key=key)
 

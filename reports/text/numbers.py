@@ -75,6 +75,14 @@ def number(value: float | None, digits: int = 5, scale: float | None = None, up:
     return _trim(text) if scale is None else text
 
 
+def digits_within(low: float, high: float, least: int = 5) -> int:
+    """The significant digits that show a thousandth of a range, as of temperatures from 300.01 to 300.02 K."""
+    size, width = max(abs(low), abs(high)), high - low
+    if not isfinite(size) or not isfinite(width) or not width > 0.0:
+        return least
+    return min(max(3 + floor(log10(size)) - floor(log10(width)), least), MOST_GIVEN)
+
+
 def limit_number(value: float) -> str:
     """A limit with all digits that it was given, such as those of a Julian date, also in kilometres in place of metres.
 
@@ -139,11 +147,11 @@ def _trim(text: str) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def interval(lower: float | None, upper: float | None, scale: float | None = None) -> str:
+def interval(lower: float | None, upper: float | None, scale: float | None = None, digits: int = 5) -> str:
     """[lower, upper], each rounded outward; a limit that the cases are too few for is a dash."""
     if lower is None and upper is None:
         return "too few cases"
-    return f"[{number(lower, scale=scale, up=False)}, {number(upper, scale=scale, up=True)}]"
+    return f"[{number(lower, digits, scale, up=False)}, {number(upper, digits, scale, up=True)}]"
 
 
 def percent(share: float | None, digits: int = 2, up: bool = False) -> str:

@@ -1,5 +1,7 @@
 """Histograms: what is cut off is said."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -65,6 +67,18 @@ def test_an_axis_of_whole_numbers_has_no_tick_between_them(values):
         low, high = axis["range"]
         assert 0.5 < (high - low) / axis["nticks"]  # plotly takes the next larger 1, 2 or 5 times a power of ten
         assert axis["tickformat"] == ",.3~f"  # a tick that a zoom puts between them is not rounded
+
+
+def test_numbers_of_a_narrow_histogram_tell_its_bins_and_bounds_apart():
+    """To five digits, a bound of −1234.5679 would be printed as −1234.5, beyond a limit of −1234.5678."""
+    values = -1234.5678 - 0.01 * np.random.Generator(np.random.Philox(key=8)).exponential(2.0, 2000)
+    found = histogram(values, "neg [K]", summarize(values), OUTER, title="all", with_intervals=True)
+    (bars,) = [mark for mark in found.marks if isinstance(mark, Bar) and mark.key == "cases"]
+    assert len({text.partition(":")[0] for text in bars.texts}) == len(bars.texts)
+    (said,) = [mark.name for mark in found.marks if isinstance(mark, Limit) and mark.key == "median"]
+    value, lower, upper = (float(text.replace("−", "-")) for text in re.findall(r"−[\d.]+", said))
+    assert lower < value < upper < -1234.5678
+    assert len({float(end.replace("−", "-")) for end in re.findall(r"−[\d.]+", found.words.partition(";")[0])}) == 2
 
 
 def spoilt(n=10_000, outliers=(900.0, 1000.0, -5000.0)):
