@@ -8,7 +8,7 @@ import numpy as np
 from reports.drawing.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot, Points, finite, intervals, names_axis
 from reports.drawing.palette import BLUE, GREEN, INK, MUTED, ORANGE, PAPER, SKY, VERMILION
 from reports.drawing.ticks import MOST_TICKS
-from reports.text.numbers import SPACE, count, number
+from reports.text.numbers import SPACE, count, digits_within, number
 
 MOST_MARGIN = 1.0  # of the reach of the limits, either way; margins beyond are drawn at the edge
 ROWS_TOGETHER = 16  # of a panel of margins: with names of four lines it fits on a page
@@ -133,15 +133,18 @@ def change_panel(
 def level_panel(label: str, levels: Sequence[str], quantiles: np.ndarray, used: Sequence[int]) -> Plot:
     """A metric by level: quantiles float64[n_levels, 7] at SPREAD, NaN for a level without a number, and counts."""
     marks: list[Mark] = []
+    ends = quantiles[np.isfinite(quantiles)]
+    digits = digits_within(float(ends.min()), float(ends.max()), least=4) if ends.size else 4
     # Places are numbers, not words: plotly would read a level such as "2" as a number or a date.
     for place, (level, row, cases) in enumerate(zip(levels, quantiles, used, strict=True)):
         for low, high, colour, width, key, fewest in SPANS:
             if 0 < cases < fewest:
                 continue
-            text = f"{level}, {count(cases)} cases: {number(float(row[low]), 4)} to {number(float(row[high]), 4)}"
+            reach = " to ".join(number(float(row[end]), digits) for end in (low, high))
+            text = f"{level}, {count(cases)} cases: {reach}"
             marks.append(Line(row[[low, high]], np.full(2, place), colour, width=width, text=text, key=key))
     median = quantiles[:, 3]
-    texts = [f"{level}: median {number(float(value), 4)}" for level, value in zip(levels, median, strict=True)]
+    texts = [f"{level}: median {number(float(value), digits)}" for level, value in zip(levels, median, strict=True)]
     marks.append(Points(median, np.arange(median.size), ORANGE, size=8.0, edge=PAPER, texts=texts, key="median"))
     known = median[np.isfinite(median)]
     log = bool(known.size and np.nanmin(quantiles) > 0.0 and known.max() > FAR_APART * known.min())

@@ -14,6 +14,7 @@ from mc_engine.units import UNITS, unit_suffix
 NO_BREAK = "\N{NO-BREAK SPACE}"
 SPACE = "\u202f"  # narrow, no-break: groups digits and stands before a unit
 MOST_DIGITS = 8  # of one number in a table
+MOST_BESIDE = 11  # of one whose spread is told beside it: a Julian date to some seconds
 MOST_GIVEN = 14  # of a limit that somebody wrote; more are of a conversion
 LONGEST_SYMBOL = 3  # letters
 LONGEST_LABEL = 44  # letters of an axis label, without its unit
@@ -66,7 +67,7 @@ def number(value: float | None, digits: int = 5, scale: float | None = None, up:
         return _power(_trim(mantissa), int(exponent))
     decimals = max(decimals_of(value, digits), 0)
     if scale is not None and isfinite(scale) and scale > 0.0:
-        room = max(decimals_of(value, MOST_DIGITS), 0)
+        room = max(decimals_of(value, MOST_BESIDE), 0)
         decimals = min(max(2 - floor(log10(scale)), 0), room, MOST_DIGITS)
     value = value if up is None else outward(value, decimals, up)
     text = fixed(value, decimals)

@@ -11,6 +11,7 @@ from reports.document.blocks import FigureBlock, Table
 from reports.drawing import paper, screen
 from reports.drawing.marks import Points
 from reports.figures.rows import level_panel
+from reports.text.numbers import SPACE
 
 LAWS = ("none", "one", "two")
 
@@ -53,6 +54,13 @@ def test_the_figure_holds_the_quantiles_of_each_level():
     assert medians.x[2] == pytest.approx(values.median(), rel=1e-12)
     json.dumps(screen.specifications(drawing), allow_nan=False)
     assert "<svg" in paper.svg(drawing)
+
+
+def test_medians_that_differ_never_print_alike():
+    quantiles = 2460000.5 + 0.01 * np.array([np.linspace(-3.0, 3.0, 7), np.linspace(-2.9, 3.1, 7)])
+    (*_, medians) = level_panel("day", ["a", "b"], quantiles, [100, 100]).marks
+    told = [text.rpartition("median ")[2].replace(SPACE, "") for text in medians.texts]
+    assert told == ["2460000.5", "2460000.501"]
 
 
 def test_few_cases_of_a_level_have_no_percentiles():

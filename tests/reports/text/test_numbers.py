@@ -77,8 +77,13 @@ def test_what_rounds_to_zero_has_no_sign():
     assert [fixed(value, 2) for value in (-0.004, 0.004, -0.006)] == ["0.00", "0.00", "−0.01"]
 
 
-def test_no_number_has_more_than_eight_digits_however_narrow_the_spread():
-    assert number(7800.00119612, scale=1e-6) == "7800.0012"
+def test_no_number_has_more_than_eleven_digits_however_narrow_the_spread():
+    assert number(7800.00119612, scale=1e-6) == "7800.0011961"
+
+
+def test_bounds_of_a_julian_date_are_not_rounded_beyond_its_limits():
+    """To eight digits these are 0.4 and 0.6, beyond limits of 0.46 and 0.54 that all cases are inside of."""
+    assert interval(2460000.49932, 2460000.50048, 0.00972) == "[2\u202f460\u202f000.4993, 2\u202f460\u202f000.5005]"
 
 
 @pytest.mark.parametrize(
