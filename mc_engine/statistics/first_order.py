@@ -131,3 +131,30 @@ def contributors(inputs: Mapping[str, Any], values: np.ndarray, sobol: bool = Fa
     found = first_orders(live, table, sobol)[0][:, 0]
     shares = [Contributor(column.name, float(share)) for column, share in zip(live, found, strict=True)]
     return sorted(shares, key=lambda contributor: -np.nan_to_num(contributor.share, nan=-1.0))
+
+
+def cases_by_input(inputs: Mapping[str, np.ndarray], nominal: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Rows of the cases in which an input is not nominal, by its name; those with all inputs nominal under "".
+
+    For a design in which one input alone is not nominal in each case.  Without names that have no rows.
+    """
+    changed = {name: values != nominal.get(name) for name, values in inputs.items()}
+    rows = {"": np.flatnonzero(~np.any([*changed.values()], axis=0))}
+    rows |= {name: np.flatnonzero(cases) for name, cases in changed.items()}
+    return {name: found for name, found in rows.items() if found.size}
+
+
+def ranked_by_change(
+    inputs: Mapping[str, np.ndarray], nominal: Mapping[str, Any], values: np.ndarray
+) -> list[Contributor]:
+    """The inputs of such a design, that first which alone changes the metric most, by its largest change.
+
+    Empty without a number where all inputs are nominal.
+    """
+    rows = cases_by_input(inputs, nominal)
+    start = values[rows.pop("", np.empty(0, np.int64))[:1]]
+    if not np.isfinite(start).any():
+        return []
+    changes = {name: np.abs(values[cases] - start) for name, cases in rows.items()}
+    found = [Contributor(name, float(np.max(np.nan_to_num(change)))) for name, change in changes.items()]
+    return sorted(found, key=lambda contributor: -contributor.share)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mc_engine.statistics.first_order import cases_by_input
 from reports.contributors.designed_indices import MOST_INPUTS, MOST_METRICS, further_metrics
 from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.drawing.marks import Drawing, Plot
@@ -83,13 +84,11 @@ class _Cases:
 
 def _cases_by_input(flown: Flown) -> dict[str, _Cases]:
     """The cases by the one input that is not nominal; those with all inputs nominal under ""."""
-    changed = {name: values != flown.nominal.get(name) for name, values in flown.inputs.items()}
-    nominal = ~np.any([*changed.values()], axis=0)
-    cases = {"": _Cases(np.flatnonzero(nominal), ())}
-    for name, values in flown.inputs.items():
-        rows = np.flatnonzero(changed[name])
-        cases[name] = _Cases(rows, tuple(_in_words(level, flown.unit(name)) for level in values[rows].tolist()))
-    return {name: found for name, found in cases.items() if found.rows.size}
+    found = {}
+    for name, rows in cases_by_input(flown.inputs, flown.nominal).items():
+        levels = flown.inputs[name][rows].tolist() if name else []
+        found[name] = _Cases(rows, tuple(_in_words(level, flown.unit(name)) for level in levels))
+    return found
 
 
 def _changes(flown: Flown, metric: str, cases: dict[str, _Cases]) -> list[SingleChanges]:

@@ -14,7 +14,7 @@ from pydantic import BaseModel, FiniteFloat, ValidationError
 from mc_engine.model.figures import KINDS, MapFigure, ScatterFigure, from_record
 from mc_engine.section import ReportSection
 from mc_engine.statistics import CHOSEN_DESIGNS, SAMPLING_DESIGNS, Summary, Verdict, summarize, was_looked_at
-from mc_engine.statistics.first_order import Contributor, contributors
+from mc_engine.statistics.first_order import Contributor, contributors, ranked_by_change
 from mc_engine.statistics.worst import Limits, limits_on
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
 from mc_engine.store.store import Store
@@ -363,9 +363,10 @@ class Flown:
     def contributors(self, metric: str) -> list[Contributor]:
         """The dispersed inputs that vary, the one that contributes most to the metric first."""
         if metric not in self._contributors:
-            self._contributors[metric] = self._by_total_effect(metric) or contributors(
-                self.inputs, self.values(metric), self.design == "sobol"
-            )
+            found, values = self._by_total_effect(metric), self.values(metric)
+            if self.design == "one_at_a_time":
+                found = ranked_by_change(self.inputs, self.nominal, values)
+            self._contributors[metric] = found or contributors(self.inputs, values, self.design == "sobol")
         return self._contributors[metric]
 
     def _by_total_effect(self, metric: str) -> list[Contributor]:

@@ -6,7 +6,7 @@ from synthetic_run import SyntheticRun, fly, synthetic_run
 
 from mc_engine.sampling.designs import unit_cube
 from reports.contents import build
-from reports.document.blocks import FigureBlock, Table
+from reports.document.blocks import FigureBlock, Table, blocks_of
 from reports.formats.json_data import run_data
 from reports.run.flown import Flown
 from reports.sections.map_blocks import map_blocks
@@ -142,6 +142,20 @@ def test_one_at_a_time_tells_what_each_input_does_alone():
         (("ve", ""), ("−10", "at −10 %"), ("20", "at 20 %"), ("2/3", "")),
         (("oe", ""), ("−15", "at −5 %"), ("0", ""), ("2/2", "")),
     ]
+
+
+def test_one_at_a_time_ranks_inputs_by_what_each_changes_alone_in_the_tables_of_worst_cases_too():
+    """Six cases are too few for shares of a variance: the inputs came in the order of the file."""
+    run = one_at_a_time()
+    run.table["entry_speed_m_s"] = 7000.0 + run.table["ve_pct"] - 10.0 * np.abs(run.table["oe_pct"])
+    run.manifest["requirements"] = [
+        {"name": "speed", "metric": "entry_speed_m_s", "at_least": 0.0, "share": 0.9, "confidence": 0.9}
+    ]
+    document = build(run, "run")
+    (table,) = [block for block in blocks_of(document, Table) if block.caption == "Cases with the smallest entry speed"]
+    assert [column.title for column in table.columns[3:5]] == ["oe [%]", "ve [%]"]
+    (changes,) = [block for block in section(run) if isinstance(block, Table)]
+    assert [row[1].text for row in changes.rows if row[0].text == "entry speed [m/s]"] == ["oe", "ve"]
 
 
 def test_one_at_a_time_without_a_nominal_number_has_no_changes():
