@@ -104,7 +104,10 @@ def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFr
     else:
         values, limits = cases[metric].to_numpy(dtype=np.float64), flown.limits(metric)
         columns.append(Column(axis_label(flown.words(metric), flown.unit(metric)), "number"))
-        cells.append(_number_cells(values))
+        # Without a spread, the limit says how many digits matter.
+        alike = limits != Limits() and values.size > 1 and np.ptp(values) == 0.0
+        texts = [limit_number(value) for value in values.tolist()] if alike else column_texts(values.tolist())
+        cells.append([Cell(text, number_or_none(value)) for text, value in zip(texts, values, strict=True)])
         if limits != Limits():
             columns.append(Column(axis_label("Margin", flown.unit(metric)), "number"))
             cells.append(_number_cells(limits.margins(values) * limits.reach))

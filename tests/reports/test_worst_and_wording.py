@@ -83,6 +83,15 @@ def test_the_worst_cases_of_a_two_sided_metric_have_the_smallest_margin_and_its_
     assert [column.title for column in table.columns[3:6]] == ["ve [%]", "oe [%]", "area factor"]
 
 
+def test_worst_cases_with_one_value_are_not_printed_as_another_beside_their_limit():
+    """Five cases at their limit of −1234.5678 were printed as −1235, inside it by 0.43, with a margin of 0."""
+    run = two_sided()
+    run.table[METRIC] = -1234.5678 - np.maximum(0.0, run.table["ve_pct"])
+    run.manifest["requirements"] = [requirement("end", METRIC, -1234.5678, None)]
+    table = block(build(run, "run"), Table, "Cases with the largest correction impulse")
+    assert {tuple(cell.text for cell in row[1:3]) for row in table.rows} == {("−1234.5678", "0")}
+
+
 def test_a_margin_counts_to_the_nearest_of_all_limits_on_the_metric():
     records = [requirement("a", "y", 5.0, -5.0), requirement("b", "y", 3.0, None), requirement("c", "z", 1.0, None)]
     assert limits_on("y", records) == Limits(3.0, -5.0)
