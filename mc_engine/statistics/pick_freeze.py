@@ -41,7 +41,8 @@ def layout_of(record: Mapping[str, Any]) -> BlockLayout:
 
 @dataclass(frozen=True)
 class PickFreeze:
-    """Indices float64[n_groups, n_metrics] with their standard errors; NaN for a metric that does not vary.
+    """Indices float64[n_groups, n_metrics] with their standard errors; NaN for a metric that does not vary, or varies
+    in fewer than 20 blocks.
 
     fall : the fraction by which the variance falls with the group at its nominal values; NaN unless that was flown.
     n_used : int64[n_metrics], blocks in which every case has a number, of n_tried.
@@ -74,7 +75,7 @@ def pick_freeze(layout: BlockLayout, case_ids: np.ndarray, metrics: Mapping[str,
         y = y[np.isfinite(y).all(axis=1)]
         n_used[k] = len(y)
         scaled = _scaled(y, y[:, : layout.n_drawn])
-        if len(y) < FEWEST_BLOCKS or scaled is None:
+        if scaled is None or _told(y[:, : layout.n_drawn]) < FEWEST_BLOCKS:
             continue
         for g, group in enumerate(layout.groups):
             by_chance = _correlation(scaled, layout.independent(group))
@@ -93,6 +94,14 @@ def whole_blocks(case_ids: np.ndarray, size: int) -> np.ndarray:
     block = case_ids[order] // size
     whole = np.bincount(block)[block] == size if block.size else np.zeros(0, dtype=bool)
     return order[whole].reshape(-1, size)
+
+
+def _told(drawn: np.ndarray) -> int:
+    """Number of blocks float64[n_blocks, n_drawn] that tell of a variance: not all rows have the metric's usual value.
+
+    Of a flag that one case of a thousand has, only some blocks do; the intervals from so few hold far too seldom.
+    """
+    return int((drawn != np.median(drawn)).any(axis=1).sum()) if drawn.size else 0
 
 
 def _scaled(y: np.ndarray, drawn: np.ndarray) -> np.ndarray | None:
