@@ -22,7 +22,7 @@ import numpy as np
 import scipy  # loads its packages when they are used
 
 from mc_engine.statistics.binomial import clopper_pearson, hypergeometric_tails
-from mc_engine.statistics.input_columns import InputColumn, average_ranks, equal_bins, finite_rows, input_columns
+from mc_engine.statistics.input_columns import InputColumn, average_ranks, equal_bins, input_columns
 from mc_engine.statistics.picked_cases import picked_rows
 
 FALSE_DISCOVERIES = 0.05  # at most this share of what is reported, on average
@@ -91,7 +91,7 @@ class SuccessCurve:
 def failure_drivers(inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray], *, sobol: bool = False) -> Drivers:
     """The drivers of each requirement's failures.  failed : bool[n] by requirement, True also without a number.
 
-    sobol : the cases are Sobol' points; pairs are not tested then.
+    sobol : the cases are Sobol' points; pairs are not tested then.  Nor are pairs with an input that a case lacks.
     Benjamini & Hochberg, J. R. Stat. Soc. B 57 (1995), 289-300, over all tests of singles, and over all of pairs.
     """
     every = np.array([np.asarray(cases, dtype=bool) for cases in failed.values()])
@@ -102,11 +102,12 @@ def failure_drivers(inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray],
     if not decided:
         return Drivers((), (), 0, 0, undecided, fewest)
     columns = input_columns(inputs)
-    rows = _tested_rows(every[decided], finite_rows(columns, every.shape[1]))
-    columns = [part for part in (column.at(rows) for column in columns) if part.varies]
-    # rows without an input may have taken failed cases away
-    tested = {names[k]: every[k, rows] for k in decided if _fewer_group(every[k, rows]) >= fewest}
-    singles = [_rank_test(name, column, lost) for name, lost in tested.items() for column in columns]
+    known = np.any([np.isfinite(column.values) for column in columns], axis=0)
+    rows = _tested_rows(every[decided], np.broadcast_to(known, every.shape[1]))
+    columns = [column.at(rows) for column in columns]
+    tested = {names[k]: every[k, rows] for k in decided}
+    singles = list(_single_tests(columns, tested, fewest))
+    columns = [column for column in columns if column.varies and np.isfinite(column.values).all()]
     rich = {name: lost for name, lost in tested.items() if not sobol and _fewer_group(lost) >= FEWEST_FOR_PAIRS}
     pairs = list(_pair_tests(columns, rich)) if rich and len(columns) > 1 else []
     by_name = {column.name: column for column in columns}
@@ -145,6 +146,19 @@ def success_along(values: Any, passed: np.ndarray, confidence: float = 0.95) -> 
         upper=limits[:, 1],
         levels=column.levels,
     )
+
+
+def _single_tests(columns: Sequence[InputColumn], failed: Mapping[str, np.ndarray], fewest: int) -> Iterator[Driver]:
+    """The test of every input for each requirement, in the cases that have the input.
+
+    An input from another run is missing where its case failed there: the other inputs still have all cases.
+    """
+    known = [np.flatnonzero(np.isfinite(column.values)) for column in columns]
+    parts = [column.at(rows) for column, rows in zip(columns, known, strict=True)]
+    for name, lost in failed.items():
+        for part, rows in zip(parts, known, strict=True):
+            if part.varies and _fewer_group(lost[rows]) >= fewest:
+                yield _rank_test(name, part, lost[rows])
 
 
 def _tested_rows(failed: np.ndarray, usable: np.ndarray) -> np.ndarray:

@@ -104,6 +104,10 @@ def _driver_table(flown: Flown, drivers: Drivers, failed: Mapping[str, np.ndarra
         "that of its cell, the thirds of both inputs where most cases fail. Inputs correlated with a contributor are "
         "listed too."
     )
+    if lacking := [
+        name for name, values in flown.inputs.items() if values.dtype.kind == "f" and np.isnan(values).any()
+    ]:
+        note += f" In some cases {flown.listed(lacking)} have no number: each is tested in the others, and in no pair."
     if left_out:
         note += f" {count(left_out)} weaker ones are not shown."
     return Table("What separates failed cases from passed ones", columns, rows, note)

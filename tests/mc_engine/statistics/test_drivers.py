@@ -174,3 +174,23 @@ def test_ranks_and_adjusted_p_values_are_those_of_scipy(shape):
     assert np.array_equal(average_ranks(values), stats.rankdata(values, axis=0))
     p_values = draw.random(40) ** 3
     assert _adjusted(p_values) == pytest.approx(stats.false_discovery_control(p_values, method="bh"), rel=1e-14)
+
+
+def test_cases_without_an_input_are_tested_by_the_others():
+    """Of a chain, the cases that failed upstream lack what they would have taken from there: they were left out, so
+    that their failures had no driver, and those of the requirement the wrong one."""
+    rng = np.random.default_rng(12)
+    angle, drag = rng.uniform(-1.0, 1.0, (2, 1000))
+    lost = angle > 0.3
+    reach = np.where(lost, np.nan, drag - 0.5 * angle)
+    beyond = lost | (reach > 0.9)
+    found = failure_drivers({"angle": angle, "drag": drag, "reach": reach}, {"reach": beyond, "completed": lost})
+    where = {(driver.requirement, driver.inputs[0]): (driver.where[0], driver.effect) for driver in found.singles}
+    expected = (
+        2.0 * stats.mannwhitneyu(angle[beyond], angle[~beyond]).statistic / (beyond.sum() * (~beyond).sum()) - 1.0
+    )
+    assert where["reach", "angle"] == ("high", pytest.approx(expected))
+    assert where["completed", "angle"] == ("high", 1.0)
+    assert where["reach", "reach"] == ("high", 1.0)
+    assert found.singles_tested == 5
+    assert {driver.inputs for driver in found.pairs} <= {("angle", "drag")}
