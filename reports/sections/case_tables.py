@@ -90,10 +90,12 @@ def _worst_words(flown: Flown, metric: str) -> str:
 def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFrame) -> Table:
     """Cases with their status, or a metric and its margin, the inputs that contribute most, and the command to replay.
 
-    Without a metric the inputs are those that contribute most to being inside all limits.
+    Without a metric the inputs are those that contribute most to being inside all limits, of those that the cases have:
+    one that failed in the run upstream has none from there.
     """
     inside_of = inside(flown).astype(np.float64)
-    ranked = flown.contributors(metric) if metric else contributors(flown.inputs, inside_of, flown.design == "sobol")
+    given = {name: values for name, values in flown.inputs.items() if metric or cases[name].notna().any()}
+    ranked = flown.contributors(metric) if metric else contributors(given, inside_of, flown.design == "sobol")
     ranked = ranked or [Contributor(name, np.nan) for name in flown.inputs]
     shown = [flown.columns[contributor.name] for contributor in ranked[:INPUTS_SHOWN]]
     columns = [Column("Case", "number")]

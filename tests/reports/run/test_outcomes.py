@@ -6,6 +6,7 @@ from synthetic_run import synthetic_run
 
 from reports.run.flown import Flown
 from reports.run.outcomes import COMPLETED, case_outcomes, failures, inside, inside_words, outcome_sentence
+from reports.sections.case_tables import worst_tables
 from reports.sections.single_cases import case_axes
 
 
@@ -58,3 +59,12 @@ def test_the_levels_of_a_grid_that_change_no_outcome_are_no_axis_of_the_figure_b
     run.manifest["columns"].append({**run.manifest["columns"][3], "name": "idle_pct"})
     run.manifest["requirements"] = [{**run.manifest["requirements"][0], "at_most": 6.5}]
     assert case_axes(Flown(run, "run")) == ("ve_pct", "oe_pct")
+
+
+def test_failed_cases_are_listed_with_inputs_that_they_have():
+    """What they would have taken from the run upstream, where they failed, was shown as "not a number" alone."""
+    run = synthetic_run(300, 30)
+    run.table["reach_km"] = np.where(run.table["status"] == "ok", run.table["ve_pct"], np.nan)
+    run.manifest["columns"].insert(3, {**run.manifest["columns"][3], "name": "reach_km", "unit": "km"})
+    (table,) = [table for table in worst_tables(Flown(run, "run")) if table.caption.startswith("Failed cases")]
+    assert {column.title for column in table.columns[2:-1]} == {"ve [%]", "oe [%]"}
