@@ -85,7 +85,8 @@ class Contributions:
     that matter first, of which alone pages show tables and figures.
 
     flights : of the companion, 0 where all comes from the table of cases.  n_used, n_tried : by metric, the blocks or
-    cases that the indices rest on.  members : the inputs in each group of the flights; empty without them.
+    cases that the indices rest on.  members : the inputs in each group of the flights, in any order; empty without
+    them.
     trends : what the table of cases tells besides; None with flights.
     """
 
@@ -153,7 +154,12 @@ def _of_companion(flown: "Flown", store: Store, metrics: list[str]) -> Contribut
         for k, metric in enumerate(metrics)
     }
     used = {metric: int(n) for metric, n in zip(metrics, indices.n_used, strict=True)}
-    members = {group["name"]: list(group["members"]) for group in record["groups"]}
+    # The group of the cases of a run upstream has what is taken from there; random draws, in repeated flights, nothing.
+    taken = [*(flown.manifest.get("upstream") or {}).get("links", {})]
+    members = {
+        group["name"]: list(group["members"]) or (taken if group["name"] not in layout.repeated else [])
+        for group in record["groups"]
+    }
     return Contributions(by_metric, len(cases), used, indices.n_tried, members)
 
 

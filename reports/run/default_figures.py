@@ -35,7 +35,8 @@ def _suggested(flown: Flown) -> Iterator[ScatterFigure]:
             continue
         found = flown.contributions
         acting, strongest = ([], []) if found is None else (found.acting(metric), found.strongest(metric))
-        for name in [*acting, *(contributor.name for contributor in flown.contributors(metric))]:
+        ranked = [contributor.name for contributor in flown.contributors(metric)]
+        for name in sorted(ranked, key=lambda name: name not in acting):
             if np.isfinite(flown.values(name)).any():
                 what = "its strongest contributor, " if name in strongest else ""
                 title = f"{flown.words(metric)} over {what}{flown.words(name)}"

@@ -374,7 +374,12 @@ class Flown:
         if self.contributions is None:
             return []
         rows, members, inputs = self.contributions.by_metric.get(metric, ()), self.contributions.members, self.inputs
-        named = [(name, row.size) for row in rows for name in members.get(row.input, [row.input])]
+        alone: dict[str, int] = {}
+        if any(len(group) > 1 for group in members.values()):  # which of a group matter, the table of cases tells
+            ranked = contributors(inputs, self.values(metric), self.design == "sobol")
+            alone = {contributor.name: place for place, contributor in enumerate(ranked)}
+        groups = [(row, members.get(row.input, [row.input])) for row in rows]
+        named = [(n, row.size) for row, group in groups for n in sorted(group, key=lambda n: alone.get(n, len(alone)))]
         return [Contributor(name, size) for name, size in named if name in inputs]
 
     @cached_property

@@ -83,6 +83,24 @@ def test_an_input_is_not_called_the_strongest_contributor_where_the_random_draws
     assert titles == ["Propellant over ve", "Propellant over its strongest contributor, ve"]
 
 
+def test_of_the_cases_of_another_run_the_input_that_matters_stands_for_their_effect(tmp_path):
+    """The group of these cases had no inputs: a metric was drawn over the only other one, that explains nothing."""
+    shutil.copy(MODEL, tmp_path)
+    (tmp_path / "first.toml").write_text(HEAD.replace("60", "200").replace("256", "32") + INPUTS + LINE)
+    first = mc_engine.load_campaign(tmp_path / "first.toml")
+    mc_engine.run(first, tmp_path / "first", workers=1)
+    own = INPUTS[INPUTS.index("[dispersion.x4]") :]
+    taken = '[inputs]\nfrom = "first"\n[inputs.columns]\nx1 = "scaled"\nx3 = "line"\n'
+    head = HEAD.replace("cases = 60\n", "").replace("seed = 3", "seed = 4")
+    (tmp_path / "second.toml").write_text(head + own + taken + LINE)
+    run = mc_engine.run(mc_engine.load_campaign(tmp_path / "second.toml"), tmp_path / "second", workers=1)
+    flown = Flown(run, "run")
+    assert flown.contributions.by_metric["line"][0].input == "cases of first"
+    assert next(contributor.name for contributor in flown.contributors("line")) == "x3"
+    titles = [figure.title for figure in scatter_figures(flown) if figure.y == "line"]
+    assert titles == ["Line over its strongest contributor, x3"]
+
+
 def test_the_note_bounds_the_columns_that_are_bounded_and_no_others():
     """A variance may grow where an input that interacts is held at its nominal value."""
     row = Contributor("propellant_kg", "ve_pct", 0.4, 0.9, (0.3, 0.5), (0.8, 1.0), -0.25, (-0.4, -0.1))
