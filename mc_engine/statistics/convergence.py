@@ -38,6 +38,7 @@ class RunningEstimate:
     reach : larger distance of the last interval's ends from the estimate, in standard deviations; None if one is open.
     halves_p : probability of a difference at least as large as that of the two halves by chance alone.
     tails : for a mean, the mean |x - mean|³ over σ³ √n; 0 for a quantile, whose interval is exact.
+    tied : for a quantile, whether most numbers from end to end of the interval equal others, as those of a flag do.
     """
 
     probability: float | None
@@ -50,6 +51,7 @@ class RunningEstimate:
     reach: float | None
     halves_p: float
     tails: float = 0.0
+    tied: bool = False
 
     @property
     def close(self) -> float:
@@ -66,9 +68,9 @@ class RunningEstimate:
     def cases_wanted(self) -> int | None:
         """Approximate number of cases with a sufficiently narrow interval: the width falls with their square root.
 
-        None if the interval is narrow enough, or has an open end.
+        None if the interval is narrow enough, has an open end, or narrows from one of few values to the next.
         """
-        if self.reach is None or self.reach <= self.close:
+        if self.reach is None or self.reach <= self.close or self.tied:
             return None
         return int(np.ceil(self.n_tried * (self.reach / self.close) ** 2))
 
@@ -127,7 +129,10 @@ def running_quantile(values: np.ndarray, probability: float, confidence: float =
     above = finite > estimate[-1]
     half = -(-finite.size // 2)
     p = min(1.0, 2.0 * min(hypergeometric_tails(finite.size, int(above.sum()), half, int(above[:half].sum()))))
-    return RunningEstimate(probability, cases, estimate, lower, upper, finite.size, values.size, reach, p)
+    between = finite[(finite >= lower[-1]) & (finite <= upper[-1])]
+    tied = bool(2 * np.unique(between).size < between.size)
+    found = estimate, lower, upper, finite.size, values.size, reach, p
+    return RunningEstimate(probability, cases, *found, tied=tied)
 
 
 def _numbers(values: np.ndarray) -> np.ndarray | None:

@@ -93,3 +93,14 @@ def test_a_mean_of_moderately_skewed_cases_settles():
     draw = np.random.Generator(np.random.Philox(key=5))
     assert all(running_mean(1e9 + 1e-3 * draw.exponential(size=2000)).reach < 0.05 for _ in range(20))
     assert np.mean([running_mean(draw.exponential(size=2000)).settled for _ in range(100)]) > 0.95
+
+
+def test_a_percentile_of_few_values_is_not_said_to_need_a_number_of_cases():
+    """Its bounds do not narrow with the square root: of a flag, 21 million cases were said to be needed."""
+    flag = running_quantile((np.arange(3000) % 375 == 7).astype(float), 0.9973)
+    assert (flag.lower[-1], flag.upper[-1]) == (0.0, 1.0)
+    assert flag.reach > 0.2
+    assert flag.cases_wanted is None
+    smooth = running_quantile(draws(3000), 0.9973)
+    assert smooth.reach > 0.2
+    assert smooth.cases_wanted > 3000
