@@ -285,8 +285,9 @@ def refuse_unwritable_file(option: str, path: Path) -> None:
         leave(USAGE, f"{option} {path}: this user may not write to the folder {path.parent}; name a file elsewhere")
     file = path.resolve()
     inside = next((folder for folder in file.parents if (folder / JOURNAL).is_file()), None)
-    own = file.parent != inside or file.stem == "report" or file.suffix in _RECORDED
-    if inside is not None and path.exists() and own:
+    if inside is not None and file.parent != inside:  # readers take all files in `cases` for cases
+        leave(USAGE, f"{option} {path}: lies in a folder of the {kind_of(inside)} {inside.name}; name a file elsewhere")
+    if inside is not None and path.exists() and (file.stem == "report" or file.suffix in _RECORDED):
         leave(USAGE, f"{option} {path}: is a file of the {kind_of(inside)} {inside.name}; name another")
 
 

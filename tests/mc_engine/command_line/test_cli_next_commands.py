@@ -94,7 +94,12 @@ def test_what_cannot_be_asked_of_sound_folders_and_urls_is_wrong_usage_and_no_da
         (["export", "a", "--out", "folder.html"], "--out folder.html: is a folder; name a file"),
         *(
             (["export", "a", "--out", name], f"--out {name}: is a file of the run a; name another")
-            for name in ("a/manifest.json", "a/journal.jsonl", next((here / "a").glob("cases/*")).relative_to(here))
+            for name in ("a/manifest.json", "a/journal.jsonl")
+        ),
+        *(
+            (words, f"{name}: lies in a folder of the run a; name a file elsewhere")
+            for name in (next((here / "a").glob("cases/*")).relative_to(here), "a/cases/new.parquet", "a/cases/new.csv")
+            for words in (["export", "a", "--out", name], ["sample", "cart", "--out", name])
         ),
     ]:  # fmt: skip
         answer = call(*words)
