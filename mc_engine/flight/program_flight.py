@@ -1,6 +1,7 @@
 """Flight of one case by a program: its files, its start, its limits, its results, and the files that it leaves."""
 
 import csv
+import errno
 import io
 import json
 import os
@@ -96,7 +97,7 @@ class ProgramFlight:
         try:
             ended = self._run(command, folder)
         except OSError as error:
-            return flown(CRASHED, f"{Path(command[0]).name} cannot be started: {error.strerror}")
+            return flown(CRASHED, f"{Path(command[0]).name} cannot be started: {_start_fault(command[0], error)}")
         finally:
             end_children(set())
         for name, written in (("stdout.txt", ended.stdout[-MOST_STDERR:]), ("stderr.txt", ended.stderr)):
@@ -198,6 +199,18 @@ class ProgramFlight:
             raise ValueError(f'{self._program.history} has {found} "{wrong[0]}"')
         places = [0, *(names.index(name) for name in wanted[1:])]  # the first column is the time, whatever its name
         return in_time({name: table[:, place] for name, place in zip(wanted, places, strict=True)})
+
+
+def _start_fault(program: str, error: OSError) -> str:
+    """Why the system does not start a program, of which it says the same where the first line of a script is wrong."""
+    if error.errno == errno.ENOEXEC:
+        return "it is no program for this machine, and no script, whose first line is such as #!/bin/sh"
+    if error.errno == errno.ENOENT and Path(program).is_file():
+        with open(program, "rb") as file:
+            mark, _, interpreter = file.readline(4096).decode(errors="replace").rstrip("\n").partition("#!")
+        if interpreter and not mark:
+            return f'its first line names "{clean(interpreter.strip(" "))}", which is not there'
+    return error.strerror or str(error)
 
 
 class TemplateFault(Exception):

@@ -90,6 +90,32 @@ sigma = 0.5
     assert replay(tmp_path / "run", 0).differences == ()
 
 
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"#!/no/such/shell\n", 'its first line names "/no/such/shell", which is not there'),
+        (b"#!/bin/sh\r\necho\r\n", r'its first line names "/bin/sh\r", which is not there'),
+        (b"echo 1\n", "it is no program for this machine, and no script, whose first line is such as #!/bin/sh"),
+        (b"", "it is no program for this machine, and no script, whose first line is such as #!/bin/sh"),
+    ],
+)
+def test_a_program_that_the_system_cannot_start_is_named_with_the_reason(tmp_path, content, said):
+    (tmp_path / "fall").write_bytes(content)
+    (tmp_path / "campaign.toml").write_text("""
+[campaign]
+cases = 1
+design = "mc"
+seed = 3
+[simulator]
+command = ["./fall"]
+result = "result.json"
+parameter.mass_kg = { default = 10.0 }
+metric.fall_time_s = { read = "time" }
+""")
+    table = run(load_campaign(tmp_path / "campaign.toml"), tmp_path / "run", workers=1).cases()
+    assert table["reason"].tolist() == [f"fall cannot be started: {said}"]
+
+
 def test_a_pattern_that_is_searched_for_too_long_gives_no_result(monkeypatch):
     monkeypatch.setattr(program_flight, "BOUNDED_S", 0.2)
     sentence = 'the search of stdout for "(a+)+$", by which "time_s" is read, takes longer than 0.2 s'
