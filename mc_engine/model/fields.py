@@ -1,6 +1,6 @@
 """The records that a model is made of: its named numbers, events, extrema and clocks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from types import NoneType, UnionType
@@ -280,7 +280,8 @@ def uses_rates(clock: FixedStep | AdaptiveStep) -> bool:
 
 # ---- types of the values in a record, against those that its class declares
 
-_WORDS = {str: "a text", bool: "True or False", float: "a number", int: "a number", NoneType: "None"}
+_WORDS: dict[Any, str] = {str: "a text", bool: "True or False", NoneType: "None", Mapping: "a dictionary"}
+_WORDS |= dict.fromkeys((float, int), "a number")
 
 
 @cache
@@ -295,9 +296,14 @@ def refuse_other_types(record: Any, what: str) -> None:
     what : the beginning of the sentence, such as 'event "apogee"'.
     """
     for name, kind in _declared_types(record.__class__).items():
-        value = getattr(record, name)
-        if not _is_of(value, kind):
-            raise ModelError(f"{what} has {value!r} as its `{name}`; it must be {_words(kind)}")
+        refuse_other_type(record, name, kind, what)
+
+
+def refuse_other_type(record: Any, name: str, kind: Any, what: str) -> None:
+    """ModelError if the field `name` of `record` is of another type than `kind`."""
+    value = getattr(record, name)
+    if not _is_of(value, kind):
+        raise ModelError(f"{what} has {value!r} as its `{name}`; it must be {_words(kind)}")
 
 
 def _is_of(value: Any, kind: Any) -> bool:
@@ -325,4 +331,4 @@ def _words(kind: Any) -> str:
         return f"a tuple of {' and '.join(map(_words, parts))}"
     if get_origin(kind) is Callable:
         return "a function"
-    return _WORDS.get(kind, str(getattr(kind, "__name__", kind)))
+    return _WORDS.get(get_origin(kind) or kind, str(getattr(kind, "__name__", kind)))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mc_engine.errors import ModelError
-from mc_engine.model.fields import Field, Parameter, Setting, inputs_of
+from mc_engine.model.fields import Field, Parameter, Setting, inputs_of, refuse_other_type
 from mc_engine.model.figures import Figure
 from mc_engine.model.record import Model, load_record
 from mc_engine.model.rules import refuse_false_simulator
@@ -35,7 +35,12 @@ _KINDS: dict[str, tuple[Any, str]] = {
     "slots": (Integral | None, "a whole number"),
     "tolerance": (Real, "a number"),
     **dict.fromkeys(("fly", "start"), (Callable | None, "a function")),
-    "published": (tuple | list, "a tuple"),
+}
+_TUPLES: dict[str, Any] = {
+    "settings": tuple[Setting, ...],
+    "figures": tuple[Figure, ...],
+    "data": tuple[str, ...],
+    "published": tuple[Mapping[str, Any], ...],
 }
 LONGEST_S, LARGEST_MIB = 1e8, 2**30
 
@@ -125,6 +130,10 @@ class Simulator:
     def __post_init__(self) -> None:
         for name, what in (("parameters", "inputs"), ("metrics", "metrics"), ("outputs", "outputs")):
             object.__setattr__(self, name, _declared(name, what, getattr(self, name)))
+        for name, kind in _TUPLES.items():
+            if isinstance(getattr(self, name), list):
+                object.__setattr__(self, name, tuple(getattr(self, name)))
+            refuse_other_type(self, name, kind, "the simulator")
         shared = tuple(item for item in self.parameters if isinstance(item, Setting))
         object.__setattr__(self, "parameters", tuple(item for item in self.parameters if item not in shared))
         object.__setattr__(self, "settings", (*self.settings, *shared))
@@ -210,6 +219,10 @@ def load_simulator(reference: str, beside: Path | None = None) -> Simulator:
     Raises ModelError with one sentence where the module, the file or its SIMULATOR is missing or broken.
     """
     simulator = load_record(reference, beside, "SIMULATOR", Simulator)
+    if simulator.is_described:
+        raise ModelError(
+            f"{reference}: a program or an FMU flies by the table [simulator] of the campaign file; name it there"
+        )
     object.__setattr__(simulator, "name", simulator.name or Path(reference).stem.rpartition(".")[2])
     return simulator
 

@@ -11,6 +11,7 @@ import pytest
 from mc_engine import Simulator
 from mc_engine.errors import ModelError
 from mc_engine.model import Event, Field, Parameter, inputs, load_model, metrics
+from mc_engine.model.simulator import load_simulator
 from tests.mc_engine.store.small_run import ENVIRONMENT
 
 WAVE_FOLDER = Path(__file__).resolve().parents[1] / "lanes" / "models"
@@ -25,11 +26,37 @@ WAVE = load_model("wave.py", WAVE_FOLDER)
         ({"slots": 2.5}, "has 2.5 as its `slots`; it must be a whole number"),
         ({"time_limit_s": "3"}, "has '3' as its `time_limit_s`; it must be a number"),
         ({"published": 3}, "has 3 as its `published`; it must be a tuple"),
+        (
+            {"published": ("table 2",)},
+            "has ('table 2',) as its `published`; it must be a tuple, each item a dictionary",
+        ),
+        (
+            {"data": "aero.csv"},
+            "has 'aero.csv' as its `data`; it must be a tuple, each item a text; one alone needs its",
+        ),
+        ({"data": 3}, "has 3 as its `data`; it must be a tuple, each item a text"),
+        ({"data": [3]}, "has (3,) as its `data`; it must be a tuple, each item a text"),
+        ({"figures": "map.png"}, "has 'map.png' as its `figures`; it must be a tuple, each item MapFigure or"),
+        ({"settings": ("law",)}, "has ('law',) as its `settings`; it must be a tuple, each item Setting"),
     ],
 )
 def test_a_simulator_whose_record_holds_something_else_is_refused(given, sentence):
     with pytest.raises(ModelError, match=re.escape(sentence)):
         Simulator(title="A wave", parameters=inputs(), metrics=metrics(time_s="time"), **given)
+
+
+@pytest.mark.parametrize("given", ['fmu="plant.fmu"', "program=3"])
+def test_a_program_or_an_fmu_of_a_file_in_python_is_refused_with_the_place_for_it(tmp_path, given):
+    (tmp_path / "sim.py").write_text(f"""
+from mc_engine import Simulator
+from mc_engine.model import inputs, metrics
+
+SIMULATOR = Simulator(title="A wave", parameters=inputs(), metrics=metrics(time_s="time"), {given})
+""")
+    with pytest.raises(
+        ModelError, match=r"sim.py: a program or an FMU flies by the table \[simulator\] of the campaign"
+    ):
+        load_simulator("sim.py", tmp_path)
 
 
 def test_a_model_that_contradicts_itself_is_refused():
