@@ -116,7 +116,8 @@ def status(place: RunPlace) -> None:
     missing = store.missing()
     if writer is not None:
         rows, _ = rows_so_far(store.path)
-        typer.echo(f"flying    by {described(writer)}{f', {rows:,} further cases are complete' if rows else ''}")
+        further = f", {counted(rows, 'further case')} complete" if rows else ""
+        typer.echo(f"flying    by {described(writer)}{further}")
     elif missing:
         resume = f"resume RUN --publish {shell_word(place)}" if is_url(place) else f"resume {shell_word(place)}"
         recorded = 0 if is_url(place) else recorded_cases(store.path)

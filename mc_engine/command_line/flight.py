@@ -37,6 +37,7 @@ from mc_engine.command_line.app import (
 from mc_engine.command_line.next_step import MERGE, after_flight, after_merge, is_complete, journal_lines
 from mc_engine.errors import DiskError, RunInterrupted, UsageError
 from mc_engine.interruption import NOTHING_BEGUN, advise, raise_if_signalled
+from mc_engine.numbers_in_text import counted
 from mc_engine.shell_words import shell_word
 from mc_engine.status import MOST_CASES
 
@@ -242,7 +243,7 @@ def finish(
         typer.echo(f"no case completed; {why}", err=True)
     elif line := summary.failure_line(store):
         typer.echo(line)
-    _judge_failures(failed, max_failed)
+    judge_failures(failed, max_failed)
     if judge and any(verdict.outcome != "pass" for verdict in judged):
         leave(NOT_MET, "not every requirement is met")
 
@@ -254,12 +255,12 @@ def _finish_shard(store: "Store", max_failed: int | None) -> None:
     typer.echo(f"shard        {store.path}")
     typer.echo(f"cases        {ranges(store.committed())}: " + ", ".join(f"{n:,} {word}" for word, n in counts.items()))
     typer.echo(f"next         {MERGE}")
-    _judge_failures(failed_cases(counts), max_failed)
+    judge_failures(failed_cases(counts), max_failed)
 
 
-def _judge_failures(failed: int, allowed: int | None) -> None:
+def judge_failures(failed: int, allowed: int | None) -> None:
     if allowed is not None and failed > allowed:
-        leave(TOO_MANY_FAILED, f"{failed} cases failed; at most {allowed} were allowed")
+        leave(TOO_MANY_FAILED, f"{counted(failed, 'case')} failed; at most {allowed} were allowed")
 
 
 @app.command()

@@ -8,9 +8,11 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 from cart import CAMPAIGN, MODEL, call, fails_with, small_store
+from typer import Exit
 
 import mc_engine.runner
 from mc_engine import durable_file
+from mc_engine.command_line.flight import judge_failures
 from mc_engine.command_line.next_step import after_flight
 from mc_engine.errors import ModelError, RunInterrupted, StoreError
 from mc_engine.store.opening import open_store
@@ -185,9 +187,13 @@ def test_judging_exits_with_1_where_a_requirement_is_not_met(here, calls):
     assert calls.reports == [("html", "pdf")]
 
 
-def test_more_failed_cases_than_allowed_exit_with_3(here, calls):
+def test_more_failed_cases_than_allowed_exit_with_3(here, calls, capsys):
     fails_with(3, call("run", "cart", "--out", "a", "--max-failed", 3, "--judge"), "4 cases failed; at most 3")
     assert call("run", "cart", "--out", "b", "--max-failed", 4).exit_code == 0
+    for failed, said in [(1, "1 case failed; at most 0"), (2000, "2,000 cases failed; at most 0")]:
+        with pytest.raises(Exit):
+            judge_failures(failed, 0)
+        assert said in capsys.readouterr().err
 
 
 def test_what_goes_wrong_in_flight_sets_the_exit_status(here, calls):
