@@ -222,11 +222,16 @@ def units_at_the_end(name: str) -> list[str]:
 
 
 def _units_by_ending(name: str) -> list[str]:
-    return [unit for unit in UNITS if unit and name.endswith(unit_suffix(unit)) and name != unit_suffix(unit)]
+    """The same, whatever stands before the unit, but for "per": lapse_k_per_km is no length."""
+    before = {unit: name.removesuffix(unit_suffix(unit)) for unit in UNITS if unit}
+    return [unit for unit, rest in before.items() if rest not in ("", name) and not rest.endswith("_per")]
 
 
 def _alike(name: str) -> str:
     """The name with the unit that its last words are nearly; "" where they are like none."""
+    if "_per_" in name:  # deg_per_s is written deg_s
+        plain = name.replace("_per_", "_")
+        return plain if any("/" in unit for unit in units_at_the_end(plain)) else ""
     words = name.split("_")
     for count in range(1, min(_LONGEST_ENDING, len(words) - 1) + 1):
         ending = "_".join(words[-count:]) or "_"

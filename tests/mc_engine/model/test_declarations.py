@@ -84,6 +84,8 @@ def test_a_unit_that_is_not_told_is_asked_for():
         ("delay_sec", 'did you mean "delay_s"?'),
         ("angle_dge", 'did you mean "angle_deg"?'),
         ("arm_n_m", 'may end in the unit N m or N/m; say which, unit="N m"'),
+        ("rate_deg_per_s", 'ends in no unit; did you mean "rate_deg_s"?'),
+        ("lapse_k_per_km", '"lapse_k_per_km" ends in no unit; say unit="" for a plain number'),
         ("gain_1_s", 'may end in the unit 1/s or s; say which, unit="1/s"'),
     ]:
         with pytest.raises(ModelError) as error:
