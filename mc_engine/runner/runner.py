@@ -21,7 +21,6 @@ from mc_engine.errors import CampaignError, EngineError, ModelError, Problem, St
 from mc_engine.flight.chunks import name_upstream
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import in_threads
-from mc_engine.model.simulator import Simulator
 from mc_engine.runner.backends import Backend, flyer_on
 from mc_engine.runner.flown_campaign import campaign_of, companions_of, refuse_undeclared_data
 from mc_engine.runner.histories import history_frame, inputs_of
@@ -31,7 +30,6 @@ from mc_engine.runner.sessions import Session, complete, count_of, fly_failed, s
 from mc_engine.runner.shards import Shard, merge_shards
 from mc_engine.sampling.designs import block_problem, extension_problem
 from mc_engine.status import CRASHED, STATUS_NAME
-from mc_engine.store.case_rows import recorded_cases
 from mc_engine.store.opening import open_store
 from mc_engine.store.parts import PART_FOLDERS
 from mc_engine.store.repair import mend_journal
@@ -97,8 +95,8 @@ def run(
 
     Raises StoreError if `out` is occupied or a URL, and RunInterrupted on Ctrl-C or a full disk; completed chunks are
     kept, and `resume` flies the rest.  Raises ModelError if the model is at fault; if no case has completed, the run is
-    removed, so that the same call flies the corrected model.  The nominal case counts for a simulator, which may take
-    hours for it.
+    removed, so that the same call flies the corrected model.  A simulator that no longer starts once a case has been
+    flown, be it the nominal one, interrupts the run.
 
     >>> store = run(load_campaign("minimal", cases=8), "runs/example")
     >>> store.cases()["apogee_altitude_km"].median().round(1)
@@ -122,8 +120,7 @@ def run(
     try:
         return complete(store, campaign, session)
     except ModelError:
-        long_flown = isinstance(campaign.model, Simulator) and store.nominal_part is not None
-        if not (long_flown or store.parts or recorded_cases(path)):  # `resume` would fly its copy of the faulty model
+        if not store.parts:  # `resume` would fly its copy of the faulty model
             _remove(path, companions)
         raise
 

@@ -15,7 +15,7 @@ from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.sensitivity_design import DESIGN as PICK_FREEZE
 from mc_engine.campaign.sensitivity_design import companion, sensitivity_record
 from mc_engine.durable_file import remove_file
-from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError, WorkersLost
+from mc_engine.errors import DiskError, EngineError, ModelError, RunInterrupted, StoreError, WorkersLost
 from mc_engine.flight.chunks import NOMINAL_TASK, Task, chunk_size, rerun_tasks
 from mc_engine.flight.flyer import Flyer
 from mc_engine.flight.flyers import flyer_of
@@ -136,7 +136,8 @@ def _counting(session: Session, flown: int, cases: int, failed: int = 0) -> Sess
 def _as_writer(store: Store, campaign: Campaign, command: str, session: Session) -> Iterator[threading.Event]:
     """Hold the run's lock, and yield the event that a signal sets.
 
-    command : continues the run.  A run that is stopped, by whatever cause, raises RunInterrupted with that command.
+    command : continues the run.  A run that is stopped, by whatever cause, raises RunInterrupted with that command.  So
+        does a simulator that no longer starts, for want of a licence perhaps, once a case has been flown.
     """
     place = shell_word(store.path)
     simulator = campaign.model if isinstance(campaign.model, Simulator) else None
@@ -144,17 +145,21 @@ def _as_writer(store: Store, campaign: Campaign, command: str, session: Session)
     try:
         with store.lock(), stop_signal(GIVING_UP if left else COMPLETING) as stop:
             yield stop
-    except (StoreError, RunInterrupted, KeyboardInterrupt) as error:
+    except (StoreError, ModelError, RunInterrupted, KeyboardInterrupt) as error:
         why = str(error)
         if not (store.path / JOURNAL).exists():
             why = f"{store.path}: was moved or removed while the run was flying; if it was moved, no case is lost and"
             place = "NEW_PLACE"
-        elif isinstance(error, DiskError):
+        elif isinstance(error, DiskError) or (isinstance(error, ModelError) and simulator and _has_flown(store)):
             why += "; what was committed is safe,"
         elif not isinstance(error, RunInterrupted):
             raise
         again = f"mc-engine {command} {place}{session.backend.options()}"
         raise RunInterrupted(f"{why} `{again}` flies the rest") from error
+
+
+def _has_flown(store: Store) -> bool:
+    return bool(store.parts or store.nominal_part or recorded_cases(store.path))
 
 
 def fly_failed(store: Store, campaign: Campaign, session: Session) -> Store:

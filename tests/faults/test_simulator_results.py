@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from mc_engine import load_campaign, replay, run
+from mc_engine import RunInterrupted, load_campaign, replay, resume, run
 from mc_engine.flight import program_flight
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.runner.flown_campaign import copies_of
@@ -234,3 +234,34 @@ else: time.sleep(0.1)  # in which the copy would reply
         file = python_campaign(tmp_path / name, cases=8, fault=fault, options=options)
         tables.append(run(load_campaign(file), tmp_path / f"{name}_run", workers=1).cases())
     assert tables[1].equals(tables[0])
+
+
+LICENCE = """
+from pathlib import Path
+
+def licence():
+    left = int(Path({0!r}).read_text())
+    Path({0!r}).write_text(str(left - 1))
+    if left <= 0:
+        raise OSError("no licence is left")
+"""
+
+
+@pytest.mark.parametrize("backend", ["threading", "loky"])
+def test_a_start_that_fails_once_cases_have_completed_interrupts_a_run_that_is_resumed(tmp_path, backend):
+    licences = tmp_path / "licences"
+    ends = "import os\nif case.id in (3, 5):\n    os.kill(os.getpid(), 9)"
+    imports = LICENCE.format(str(licences))
+    file = python_campaign(tmp_path / "ball", cases=8, fault=ends, imports=imports, options="start=licence,")
+    campaign, path = load_campaign(file), tmp_path / "run"
+    said = r"OSError: no licence is left; what was committed is safe, `mc-engine resume \S+run( --backend loky)?` flies"
+    licences.write_text("2")
+    with pytest.raises(RunInterrupted, match=said):
+        run(campaign, path, workers=1, backend=backend)
+    licences.write_text("0")
+    with pytest.raises(RunInterrupted, match=said):
+        resume(path, workers=1)
+    licences.write_text("9")
+    whole = run(campaign, tmp_path / "whole", workers=1).cases()
+    licences.write_text("9")
+    assert resume(path, workers=1).cases().equals(whole)

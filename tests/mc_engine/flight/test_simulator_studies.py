@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from mc_engine import load_campaign, open_run, open_store, run
 from mc_engine.command_line.commands import app
-from mc_engine.errors import ModelError
+from mc_engine.errors import ModelError, RunInterrupted
 from mc_engine.flight import case_process
 from mc_engine.flight.program_flight import _document
 from mc_engine.runner.backends import Backend
@@ -343,7 +343,7 @@ def test_a_process_that_cannot_start_after_the_nominal_case_leaves_a_run_that_re
     imports = f"from pathlib import Path\nif Path({str(busy)!r}).exists(): raise OSError('no licence')\n"
     fault = f"open({str(busy)!r}, 'w').close()\nif np.size(case.id) > 1: import os; os._exit(1)"
     ball = python_campaign(tmp_path / "ball", cases=4, imports=imports, fault=fault, options=BATCH)
-    with pytest.raises(ModelError, match="no licence"):
+    with pytest.raises(RunInterrupted, match=r"no licence; what was committed is safe, `mc-engine resume "):
         run(load_campaign(ball), tmp_path / "run", workers=1)
     busy.unlink()
     assert open_store(tmp_path / "run").nominal()["status"] == "ok"
