@@ -39,8 +39,8 @@ def companion_blocks(flown: Flown, contributions: Contributions) -> Iterator[Fig
 def no_contributors(flown: Flown, silent: list[str], used: str = "cases") -> Iterator[str]:
     """A sentence on metrics whose contributors are not known; used : what indices rest on, cases or blocks of them."""
     if silent:
-        few = f"fewer than {FEWEST_CASES} {used} with a number"
-        few += ", or with another than the usual one" if used == "blocks" else ""
+        what = "a number other than the usual one" if used == "blocks" else "a number"
+        few = f"fewer than {FEWEST_CASES} {used} with {what}"
         yield f"No contributors for {flown.listed(silent)}: the same in all cases that have it, or {few}."
 
 
