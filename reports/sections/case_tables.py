@@ -106,13 +106,10 @@ def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFr
     else:
         values, limits = cases[metric].to_numpy(dtype=np.float64), flown.limits(metric)
         columns.append(Column(axis_label(flown.words(metric), flown.unit(metric)), "number"))
-        # Without a spread, the limit says how many digits matter.
-        alike = limits != Limits() and values.size > 1 and np.ptp(values) == 0.0
-        texts = [limit_number(value) for value in values.tolist()] if alike else column_texts(values.tolist())
-        cells.append([Cell(text, number_or_none(value)) for text, value in zip(texts, values, strict=True)])
+        cells.append(_cells_beside(values, [end for end in limits if end is not None]))
         if limits != Limits():
             columns.append(Column(axis_label("Margin", flown.unit(metric)), "number"))
-            cells.append(_number_cells(limits.margins(values) * limits.reach))
+            cells.append(_cells_beside(limits.margins(values) * limits.reach, [0.0]))
     for fact in shown:
         columns.append(Column(axis_label(flown.words(fact.name), fact.unit), "number"))
         cells.append(_input_cells(cases[fact.name]))
@@ -120,6 +117,16 @@ def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFr
         columns.append(Column("Command to replay, in the run’s folder", "code"))
         cells.append([Cell(f"mc-engine replay . {case}") for case in cases["case_id"]])
     return Table(caption, tuple(columns), tuple(zip(*cells, strict=True)), _inputs_said(flown, ranked, len(shown)))
+
+
+def _cells_beside(values: np.ndarray, limits: list[float]) -> list[Cell]:
+    """Numbers of a column with the digits that tell them apart, also from limits that they are compared with."""
+    numbers = values.tolist()
+    alone, beside = column_texts(numbers), column_texts([*numbers, *limits])[: len(numbers)]
+    texts = max(alone, beside, key=lambda texts: sum(map(len, texts)))
+    if set(numbers) <= set(limits):
+        texts = [limit_number(value) for value in numbers]
+    return [Cell(text, number_or_none(value)) for text, value in zip(texts, numbers, strict=True)]
 
 
 def _inputs_said(flown: Flown, ranked: list[Contributor], shown: int) -> str:

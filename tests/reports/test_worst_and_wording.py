@@ -92,6 +92,16 @@ def test_worst_cases_with_one_value_are_not_printed_as_another_beside_their_limi
     assert {tuple(cell.text for cell in row[1:3]) for row in table.rows} == {("−1234.5678", "0")}
 
 
+def test_a_worst_case_just_beyond_its_limit_is_not_printed_as_the_limit():
+    """−4.96 beside cases down to −30 was printed as −5.0, the limit, with a margin of 0.0."""
+    run = two_sided()
+    run.table[METRIC] = [-4.96, -12.3, -19.4, -25.2, -30.1, *np.linspace(-40.0, -50.0, len(run.table) - 5)]
+    run.manifest["requirements"] = [requirement("end", METRIC, -5.0, None)]
+    table = block(build(run, "run"), Table, "Cases with the largest correction impulse")
+    assert [row[1].text for row in table.rows] == ["−4.96", "−12.30", "−19.40", "−25.20", "−30.10"]
+    assert table.rows[0][2].text == "−0.04"
+
+
 def test_a_margin_counts_to_the_nearest_of_all_limits_on_the_metric():
     records = [requirement("a", "y", 5.0, -5.0), requirement("b", "y", 3.0, None), requirement("c", "z", 1.0, None)]
     assert limits_on("y", records) == Limits(3.0, -5.0)
