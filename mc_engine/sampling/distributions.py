@@ -16,6 +16,7 @@ import numpy as np
 
 Scalar = float | bool | str
 
+_BELOW_ONE = 1.0 - 2.0**-53
 _TAIL = 0.5 * math.erfc(3.0 / math.sqrt(2.0))  # share of a normal beyond three sigma on one side, 0.00135
 
 
@@ -190,7 +191,8 @@ class Truncated(Distribution):
     def ppf(self, u: np.ndarray) -> np.ndarray:
         below, above = self.base.cdf(self.lower), self.base.sf(self.lower)
         if below < 0.5:
-            x = self.base.ppf(below + u * (self.base.cdf(self.upper) - below))
+            # 1 by rounding would be infinite
+            x = self.base.ppf(np.minimum(below + u * (self.base.cdf(self.upper) - below), _BELOW_ONE))
         else:  # in the upper tail the cdf is 1 but for the last digits; its complement is exact
             x = self.base.isf(above - u * (above - self.base.sf(self.upper)))
         return np.clip(x, *self.support)  # takes back the last rounding, nothing more
@@ -328,7 +330,7 @@ def quantiles(distribution: Distribution, u: np.ndarray) -> np.ndarray:
 
     0 and 1 are moved inwards by less than their rounding, so that no draw is infinite.
     """
-    return distribution.ppf(np.clip(u, 2.0**-54, 1.0 - 2.0**-53))
+    return distribution.ppf(np.clip(u, 2.0**-54, _BELOW_ONE))
 
 
 def column(values: tuple[Scalar, ...] | list[Scalar]) -> np.ndarray:

@@ -53,6 +53,13 @@ def test_quantiles_rise_and_stay_in_the_support(ours):
     assert low <= x[0] < x[-1] <= high
 
 
+def test_no_draw_of_a_tail_that_is_cut_below_alone_is_infinite():
+    """Even where the share below the cut and the largest number below 1 round to 1."""
+    largest = [quantiles(Truncated(Normal(0.0, 1.0), cut, math.inf), np.array([1.0]))[0] for cut in np.linspace(-3, 0)]
+    assert np.isfinite(largest).all()
+    assert min(largest) > 8.0
+
+
 @pytest.mark.parametrize("ours", [Normal(3.0, 2.0), Lognormal(2.0, 0.5), Exponential(2.0, 0.7)])
 @given(u=st.floats(1e-12, 1.0 - 1e-9))
 def test_the_share_below_a_quantile_is_the_one_asked_for(ours, u):
