@@ -91,6 +91,22 @@ ANGLES = [
 
 
 @pytest.mark.parametrize(
+    ("name", "bound", "x", "y"),
+    [
+        ("sin", 1.6, 186831391.7383554, 1.0),
+        ("cos", 1.6, -697199440.4588196, 1.0),
+        ("tan", 3.0, 557081235.7606905, 1.0),
+        ("asin", 2.7, 0.3980832040607211, 1.0),
+        ("acos", 2.7, 0.923588737309933, 1.0),
+        ("atan", 2.1, 0.4253130725106696, 1.0),
+        ("atan2", 2.1, 0.7205305727026304, 1.7239585083330549),
+    ],
+)
+def test_largest_errors_of_millions_of_arguments_are_as_stated(name, bound, x, y):
+    assert error_in_ulp(name, [x], [y]) <= bound
+
+
+@pytest.mark.parametrize(
     "x",
     [
         pytest.param(spread_out(-708, 709.7), id="all"),
