@@ -141,20 +141,20 @@ def metric_change(
     else:
         a, b = a[np.isfinite(a)], b[np.isfinite(b)]
     used = (a.size, b.size)
-    if min(used) == 0:
-        return MetricChange(metric, used, tried, 0 if paired else None, _by_run(np.mean, a, b), _by_run(np.std, a, b),
-                            UNKNOWN, UNKNOWN, np.nan, np.nan)  # fmt: skip
     both, exponent = near_one(np.concatenate([a, b]))
     a, b = both[: a.size], both[a.size :]
-    scale = float(np.abs(both).max())
-    unit = max(tolerance * float(a.std()), _ROUNDING * scale)
-    differing = int(np.count_nonzero(np.abs(b - a) > unit)) if paired else None
 
     def back(pair: Sequence[float]) -> tuple[float, float]:
         return float(in_units(float(pair[0]), exponent)), float(in_units(float(pair[1]), exponent))
 
     mean, deviation = _by_run(np.mean, a, b), _by_run(_deviation, a, b)
-    described = metric, used, tried, differing, back(mean), back(deviation)
+    by_run = back(mean), back(deviation)
+    if min(used) == 0:
+        return MetricChange(metric, used, tried, 0 if paired else None, *by_run, UNKNOWN, UNKNOWN, np.nan, np.nan)
+    scale = float(np.abs(both).max())
+    unit = max(tolerance * float(a.std()), _ROUNDING * scale)
+    differing = int(np.count_nonzero(np.abs(b - a) > unit)) if paired else None
+    described = metric, used, tried, differing, *by_run
     if min(used) < FEWEST:
         shift = Estimate(float(in_units(mean[1] - mean[0], exponent)), -inf, inf)
         return MetricChange(*described, shift, UNKNOWN, np.nan, np.nan)

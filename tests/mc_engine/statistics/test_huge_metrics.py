@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mc_engine.statistics.change_tests import metric_change
 from mc_engine.statistics.convergence import running_mean, running_quantile
 from mc_engine.statistics.moments import in_units, near_one
 from mc_engine.statistics.summary import nearly_equal, summarize
@@ -26,3 +27,10 @@ def test_what_lies_beyond_float64_is_infinite_and_said_to_be():
     small, exponent = near_one(np.array([1.79e308, -1.79e308, np.nan]))
     assert np.array_equal(in_units(small, exponent), [1.79e308, -1.79e308, np.nan], equal_nan=True)
     assert in_units(4.0, exponent) == np.inf
+
+
+def test_a_run_alone_with_numbers_has_the_deviation_of_its_summary():
+    for values in (PLAIN, 1e300 * PLAIN):
+        change = metric_change("m", values, np.full(N, np.nan), paired=False)
+        summary = summarize(values)
+        assert (change.mean[0], change.deviation[0]) == pytest.approx((summary.mean, summary.sd), rel=1e-12)
