@@ -16,7 +16,7 @@ from math import pi
 import numpy as np
 
 from mc_engine.errors import ModelError
-from mc_engine.lanes import cos, physics, sin, sqrt
+from mc_engine.lanes import cos, maximum, physics, sin, sqrt
 from mc_engine.physics.constants import EARTH_RATE, MU_EARTH
 from mc_engine.physics.curves import Curve, curve
 from mc_engine.physics.earth_frames import wind_from_body
@@ -252,7 +252,8 @@ def solid_propellant(
     def propellant(t):
         r, rate = radius_of(t), -flow * thrust(t)
         long, ring, round2 = length - 2.0 * (r - inner), outer * outer - r * r, outer * outer + r * r
-        mass, growth = solid * ring * long, -0.5 * rate / (solid * (r * long + ring))
+        surface = maximum(r * long + ring, 1e-200)  # a cylinder may burn away from all sides at once, to nothing
+        mass, growth = solid * ring * long, -0.5 * rate / (solid * surface)
         across = 0.25 * round2 + long * long / 12.0 + apart
         return Propellant(
             mass=mass,

@@ -113,8 +113,9 @@ def test_sizes_that_are_no_motor_are_named(wrong):
         solid_propellant(THRUST, **{"burn": 4.0} | MOTOR | wrong)
 
 
-def test_behind_the_end_of_burning_nothing_pushes():
-    propellant = solid_propellant(THRUST, 4.0, **MOTOR)
+@pytest.mark.parametrize("sizes", [MOTOR, MOTOR | {"inner": 0.010, "length": 0.046}], ids=["long", "gone at once"])
+def test_behind_the_end_of_burning_nothing_pushes(sizes):
+    propellant = solid_propellant(THRUST, 4.0, **sizes)
     assert propellant(5.0) == pytest.approx(Propellant(*7 * (0.0,)), abs=1e-9)
 
 
