@@ -1,5 +1,7 @@
 """The standard air: density, pressure, temperature and speed of sound over altitude; dynamic pressure.
 
+An `Air` has density [kg/m^3], pressure [Pa], temperature [K] and speed_of_sound [m/s].
+
 `us76_air` follows the standard exactly up to 86 km, and its tables of density and pressure above.  For densities alone
 and for other planets see `mc_engine.physics.atmosphere`, for wind `wind_profile` of `mc_engine.physics.curves`.
 """
@@ -11,7 +13,7 @@ from itertools import pairwise
 from mc_engine.lanes import exp, maximum, minimum, physics, sqrt, where
 from mc_engine.physics.atmosphere import US76_TOP, VACUUM, us76_logarithm
 
-Air = namedtuple("Air", "density pressure temperature speed_of_sound")  # kg/m^3, Pa, K, m/s
+Air = namedtuple("Air", "density pressure temperature speed_of_sound")
 
 # U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562): gas constant of air R*/M0 [J/(kg K)] and ratio of specific heats,
 # table 2; geometric altitude [m] and pressure [Pa] above 86 km, table I.

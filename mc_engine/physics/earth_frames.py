@@ -10,7 +10,14 @@ LVLH   x ahead, y against the angular momentum, z to the centre of the Earth
 
 A matrix `ned_from_ecef` takes components in ECEF to components in NED by `matrix_times`, and back by
 `transposed_times`; `from_matrix` of `mc_engine.physics.rotations` makes a quaternion of it.  Vectors are `Vector`s, SI
-and radians.  Precession, nutation and polar motion are not modelled in flight.  Since the epoch 2000 they are tens of
+and radians.  Other records are
+
+Geodetic : latitude, longitude [rad], altitude [m] over WGS 84
+Flow : speed [m/s], alpha (angle of attack), beta (sideslip) [rad]
+Course : speed [m/s], path_angle above the horizontal, heading from north to the east [rad]
+Relative : position [m], velocity [m/s]
+
+Precession, nutation and polar motion are not modelled in flight.  Since the epoch 2000 they are tens of
 kilometres at the ground, so start from axes of date, or use `ecef_from_gcrs` before a flight.
 """
 
@@ -34,10 +41,10 @@ from mc_engine.physics.vectors import (
     transposed_times,
 )
 
-Geodetic = namedtuple("Geodetic", "latitude longitude altitude")  # rad, rad, m over WGS 84
-Flow = namedtuple("Flow", "speed alpha beta")  # m/s, angle of attack and of sideslip [rad]
-Course = namedtuple("Course", "speed path_angle heading")  # m/s, rad above the level, rad from north to the east
-Relative = namedtuple("Relative", "position velocity")  # two Vectors
+Geodetic = namedtuple("Geodetic", "latitude longitude altitude")
+Flow = namedtuple("Flow", "speed alpha beta")
+Course = namedtuple("Course", "speed path_angle heading")
+Relative = namedtuple("Relative", "position velocity")
 
 _TWO_PI = 6.283185307179586
 _MJD = 2_400_000.5

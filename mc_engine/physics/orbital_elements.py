@@ -1,5 +1,8 @@
 """Elements of closed orbits.  SI, radians.
 
+Equinoctial : a [m]; k, h, the eccentricity times cosine and sine of the longitude of the pericentre; q, p, tan(i/2)
+    times cosine and sine of the node; mean, true: mean and true longitude [rad]
+
 Equinoctial elements are regular for circular and equatorial orbits, but not near 180 degrees of inclination.  States
 from classical elements, and Kepler's equation, are in NumPy, for whole chunks of cases.
 """
@@ -10,8 +13,6 @@ import numpy as np
 
 from mc_engine.lanes import atan2, physics, sqrt
 
-# a [m]; k, h: eccentricity vector in the orbit's plane, e cos and e sin of the longitude of the pericentre;
-# q, p: tan(i/2) cos and sin of the node; mean: mean longitude; true: true longitude
 Equinoctial = namedtuple("Equinoctial", "a k h q p mean true")
 
 

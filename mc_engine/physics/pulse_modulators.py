@@ -8,6 +8,9 @@ The standard form has one gain, input_gain = feedback_gain = K.
 `lag_rate` is for a model whose trigger is an event of the engine.  `sampled_pulses` needs no events: if the command is
 held from sample to sample, the lag is an exponential, and its switching times are known.
 
+Pulses : filtered, the lag's output; output, -1.0, 0.0 or 1.0; age, the time since it last changed [s]; pulses, how many
+    have begun; shortest, the shortest that has ended [s], infinite before the first
+
 M. J. Sidi, Spacecraft Dynamics and Control (1997), section 9.3.
 """
 
@@ -16,8 +19,6 @@ from collections import namedtuple
 from mc_engine.lanes import any_lane, copysign, exp, floor, log, maximum, minimum, physics, where
 from mc_engine.lanes.functions import sign_copied
 
-# filtered: the lag's output; output: -1.0, 0.0 or 1.0; age: time since it last changed [s];
-# pulses: how many have begun; shortest: the shortest that has ended [s], infinite before
 Pulses = namedtuple("Pulses", "filtered output age pulses shortest")
 # a sample while it is followed.  left: what remains of it [s]; rest: exp(-left / time_constant); fired: integral of the
 # output so far [s]; drive: where the lag tends to; end: where it will be after `left`; turns: if it switches before

@@ -1,9 +1,19 @@
 """A rigid body with six degrees of freedom, over flat ground or about the rotating, oblate Earth; rockets.
 
-A `Motion` is position, velocity, attitude and angular rate; its derivative is a `Motion` too.  The state of a model has
-these numbers as single fields.  Forces and moments are given in body axes, moments about the centre of mass.  The
-attitude is a quaternion from the frame of the position to the body (see `mc_engine.physics.rotations`).  Not for
-flexible bodies and sloshing fuel.  SI.
+The state of a model has the numbers of a `Motion` as single fields; the derivative of a `Motion` is a `Motion` too.
+Forces and moments are given in body axes, moments about the centre of mass.  Not for flexible bodies and sloshing fuel.
+SI.  The records are
+
+Motion : position and velocity in one frame, attitude (quaternion from this frame to the body, see
+    `mc_engine.physics.rotations`), rate [rad/s] in body axes
+Inertia : moments xx, yy, zz and products xy, xz, yz of inertia [kg m^2] about the centre of mass, in body axes.  xy is
+    the integral of x y dm: the inertia tensor has -xy outside its diagonal.  Reverse the sign of products that are
+    given as elements of the tensor.
+Rocket : body that is the same all around its axis z, without propellant: mass, inertia across and axial [kg m^2] about
+    its centre of mass; distances from there to the tail [m]: propellant (its centre) and nozzle; jet, the squared
+    radius of gyration about the axis of the gas that leaves the nozzle [m^2]
+Propellant : mass, inertia across and axial [kg m^2] about its own centre; their rates: rate, across_rate, axial_rate;
+    change, the rate of the mass's rate [kg/s^2]
 
 P. H. Zipfel, Modeling and Simulation of Aerospace Vehicle Dynamics, 2nd ed. (2007), chapters 4 and 6;
 W. T. Thomson, Introduction to Space Dynamics (1961), chapters 5 and 8 (variable mass).
@@ -24,11 +34,7 @@ from mc_engine.physics.gravity import oblate
 from mc_engine.physics.rotations import derivative, transformed, transformed_back
 from mc_engine.physics.vectors import Vector, added, cross, dot, scaled, subtracted, transposed_times
 
-# position [m] and velocity [m/s] in one frame, attitude (Quaternion) from it to the body, rate [rad/s] in body axes
 Motion = namedtuple("Motion", "position velocity attitude rate")
-
-# Moments of inertia and products of inertia [kg m^2] about the centre of mass, in body axes: xy is the integral of
-# x y dm, so that the tensor has -xy beside its diagonal.
 Inertia = namedtuple("Inertia", "xx yy zz xy xz yz")
 
 
@@ -213,11 +219,7 @@ def point_of_body(motion, arm):
 
 # ---- a rocket that burns solid propellant
 
-# A body that is the same all around its axis z, without propellant: mass [kg], inertia across and along [kg m^2] about
-# its centre of mass.  From there to the tail [m]: centre of the propellant, nozzle.  jet: radius of gyration about
-# the axis of the gas that leaves the nozzle, squared [m^2].
 Rocket = namedtuple("Rocket", "mass across axial propellant nozzle jet")
-# mass [kg] and inertia [kg m^2] about its own centre, their rates, and the rate of the mass's rate [kg/s^2]
 Propellant = namedtuple("Propellant", "mass across axial rate across_rate axial_rate change")
 
 

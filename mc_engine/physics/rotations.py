@@ -1,9 +1,10 @@
 """Attitude as quaternions, direction cosines, Euler angles and rotation vectors, with one convention.
 
-A quaternion `b_from_a` (scalar first, Hamilton's product, unit length) is the rotation of frame b relative to frame a.
-`transformed(b_from_a, v_a)` gives the components in b of a vector given in a, as does its matrix `to_matrix(b_from_a)`.
-`mc_engine.physics.attitude` has the same convention.  `chained(b_from_a, c_from_b)` is c_from_a.  q and -q are the same
-attitude.  `rotated` uses a quaternion in the other sense: it rotates the vector and keeps the axes.
+A `Quaternion` is (q0, q1, q2, q3), scalar first, of unit length; products are Hamilton's.  `b_from_a` is the rotation
+of frame b relative to frame a.  `transformed(b_from_a, v_a)` gives the components in b of a vector given in a, as does
+its matrix `to_matrix(b_from_a)`.  `mc_engine.physics.attitude` has the same convention.  `chained(b_from_a, c_from_b)`
+is c_from_a.  q and -q are the same attitude.  `rotated` uses a quaternion in the other sense: it rotates the vector and
+keeps the axes.
 
 M. J. Sidi, Spacecraft Dynamics and Control (1997), appendix A.4;  M. D. Shuster, A survey of attitude
 representations, J. Astronautical Sciences 41 (1993) 439-517.

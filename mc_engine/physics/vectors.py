@@ -1,7 +1,7 @@
 """Vectors of three components, in any frame and unit, which the names of variables state: `r_ecef`, `v_body`.
 
 Written for named tuples with the fields x, y, z, such as `Vector`; results are `Vector`s.  Components may be numbers,
-lanes or arrays.
+lanes or arrays.  A `Matrix` has its numbers row by row: xx, xy, xz, yx, yy, yz, zx, zy, zz; xy is in row x, column y.
 """
 
 from collections import namedtuple
@@ -62,7 +62,7 @@ def added_scaled(a, factor, b):
     return Vector(a.x + factor * b.x, a.y + factor * b.y, a.z + factor * b.z)
 
 
-Matrix = namedtuple("Matrix", "xx xy xz yx yy yz zx zy zz")  # xy: row x, column y
+Matrix = namedtuple("Matrix", "xx xy xz yx yy yz zx zy zz")
 
 
 @physics

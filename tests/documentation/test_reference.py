@@ -64,3 +64,12 @@ def test_prose_is_never_read_as_markup_and_columns_and_arguments_stay():
     )
     assert prose("Force [N].  m : [kg]\na, b : [m]") == "Force \\[N\\].  m : \\[kg\\]\n\n- a, b : \\[m\\]"
     assert "```text\nshift    of the mean\n" in prose("shift    of the mean\nspread   of the rest")
+
+
+def test_the_reference_explains_every_field_of_the_records_of_shared_physics():
+    """Named tuples have no docstring of their own; the meaning, units and signs are in that of the module."""
+    for path in function_pages.files("physics"):
+        text = path.read_text(encoding="utf-8")
+        head = ast.get_docstring(ast.parse(text)) or ""
+        for name, fields in re.findall(r'^([A-Z]\w+) = namedtuple\("\w+", "(.*?)"\)', text, re.MULTILINE):
+            assert [word for word in (name, *fields.split()) if not re.search(rf"\b{word}\b", head)] == [], name
