@@ -2,7 +2,7 @@
 
 Errors, the largest among tens of millions of arguments: at most 1 ulp for log, 1.01 ulp for rsqrt, 1.5 ulp for exp and
 pow, 1.6 ulp for sin and cos, 2.1 ulp for atan and atan2, 2.7 ulp for asin and acos, 3 ulp for tan.  Angles up to 1e9
-rad keep that accuracy; for larger ones the reduction gradually loses digits, and from 1e16 rad on the result is
+rad keep that accuracy; for larger ones the reduction gradually loses digits, and from 7e15 rad on the result is
 meaningless.  A NaN argument gives NaN.  Zeros and infinities are as in C99, rsqrt's as in C23, except that sin and tan
 of -0.0 are 0.0 and rsqrt of -0.0 is infinity.
 """
@@ -112,7 +112,7 @@ def _cos_kernel(r):
 
 @physics
 def sincos(x):
-    """(sin x, cos x), sharing one reduction of the angle x [rad]."""
+    """(sin x, cos x) of the angle x [rad], with one reduction; both lose digits beyond 1e9 rad, all from 7e15 on."""
     r, quadrant = _reduce_angle(x)
     s, c = _sin_kernel(r), _cos_kernel(r)
     odd = (quadrant == 1.0) | (quadrant == 3.0)
@@ -122,19 +122,19 @@ def sincos(x):
 
 @physics
 def sin(x):
-    """Sine of x [rad]."""
+    """Sine of x [rad]; it loses digits beyond 1e9 rad, and all from 7e15 rad on."""
     return sincos(x)[0]
 
 
 @physics
 def cos(x):
-    """Cosine of x [rad]."""
+    """Cosine of x [rad]; it loses digits as the sine does."""
     return sincos(x)[1]
 
 
 @physics
 def tan(x):
-    """Tangent of x [rad]: the quotient of the sine and cosine kernels."""
+    """Tangent of x [rad]: the quotient of the sine and cosine kernels; it loses digits as the sine does."""
     r, quadrant = _reduce_angle(x)
     s, c = _sin_kernel(r), _cos_kernel(r)
     odd = (quadrant == 1.0) | (quadrant == 3.0)

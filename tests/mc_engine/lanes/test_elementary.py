@@ -1,6 +1,7 @@
 """Elementary functions against arithmetic of 140 bits, at special places, and width against width."""
 
 import math
+import re
 
 import mpmath
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from compiled_physics import bits, by_every_width
 
 from mc_engine import lanes
-from mc_engine.lanes import physics
+from mc_engine.lanes import elementary, physics
 
 ONE_ARGUMENT = ("exp", "sin", "cos", "tan", "asin", "acos", "atan", "log", "rsqrt")
 TWO_ARGUMENTS = ("atan2", "pow")
@@ -129,6 +130,14 @@ def test_sine_and_cosine_err_by_at_most_one_and_a_half_ulp(name, x):
 @pytest.mark.parametrize("x", ANGLES)
 def test_tangent_errs_by_at_most_two_and_a_half_ulp(x):
     assert error_in_ulp("tan", x) <= 2.5
+
+
+def test_large_angles_keep_nine_digits_up_to_where_the_docstring_says_that_sine_becomes_meaningless():
+    meaningless = float(re.search(r"from (\S+) rad on", elementary.__doc__)[1])
+    x = spread_out(1e9, meaningless)
+    with mpmath.workprec(140):
+        truth = [float(mpmath.sin(one)) for one in x.tolist()]
+    assert np.abs(interpreted("sin", x, x) - truth).max() < 1e-9
 
 
 def test_sincos_gives_the_bits_of_sin_and_cos():
