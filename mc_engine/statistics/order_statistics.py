@@ -46,13 +46,17 @@ def quantile_ranks(n: int, probability: float, confidence: float = 0.90) -> tupl
     Returns (lower, upper), ranks from 1 to n: the largest l with P(Binomial(n, p) <= l - 1) <= (1 - confidence)/2, and
     the smallest u with P(Binomial(n, p) <= u - 1) >= 1 - (1 - confidence)/2.  None where n is too small for one.
 
-    Raises nothing.
+    Raises ValueError for a probability or a confidence outside of its range.
 
     Wilks, Ann. Math. Statist. 12 (1941), 91-96.
 
     >>> quantile_ranks(100, 0.5), quantile_ranks(100, 0.99865)
     ((42, 59), (99, None))
     """
+    if not 0.0 < probability < 1.0:
+        raise ValueError(f"probability {probability} does not lie between 0 and 1")
+    if not 0.0 <= confidence < 1.0:  # 0: each limit alone has 50 %
+        raise ValueError(f"confidence {confidence} does not lie between 0 and 1")
 
     def below(rank: int) -> float:
         return float(scipy.special.bdtr(rank - 1, n, probability))
@@ -87,7 +91,8 @@ def quantile(ordered: np.ndarray, probability: float, confidence: float = 0.90) 
     Returns a Quantile.  The estimate is approximately median-unbiased: Hyndman & Fan, Amer. Statist. 50 (1996),
     361-365, type 8.
 
-    Raises IndexError without a value, ValueError if the values are not ascending or contain NaN.
+    Raises IndexError without a value; ValueError if the values are not ascending or contain NaN, and for a probability
+    or a confidence outside of its range.
 
     >>> round(quantile(np.arange(1000.0), 0.99).value, 2)
     989.66

@@ -69,12 +69,12 @@ def summarize(values: np.ndarray, *, probabilities: tuple[float, ...] = QUANTILE
     """Moments and quantiles of a metric, bit-identical for any order of the cases.
 
     values : float64[n_tried]; NaN and infinite values count as tried, not as used
-    probabilities : tuple of float, of the quantiles
+    probabilities : tuple of float in (0, 1), of the quantiles
     confidence : float in (0, 1), of the two-sided intervals on the quantiles
 
-    Returns a Summary.
+    Returns a Summary; without a finite value its numbers are None.
 
-    Raises nothing: without a finite value its numbers are None.
+    Raises ValueError for a probability or a confidence outside of its range.
 
     >>> summary = summarize(np.arange(1001.0))
     >>> summary.mean, summary.at(0.5).value

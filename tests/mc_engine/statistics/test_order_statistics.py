@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from mc_engine.statistics import QUANTILES, quantile, quantile_ranks
+from mc_engine.statistics import QUANTILES, quantile, quantile_ranks, summarize
 
 
 def slow_ranks(n, probability, confidence):
@@ -48,3 +48,18 @@ def test_the_estimate_lies_between_its_limits_and_agrees_with_numpy(probability)
 def test_values_in_no_order_have_no_quantile(values):
     with pytest.raises(ValueError, match="the values must ascend, without NaN"):
         quantile(values, 0.5)
+
+
+WRONG = [(99.0, 0.9), (0.99, 90.0), (-0.1, 0.9), (1.0, 0.9), (0.99, 1.0)]
+
+
+@pytest.mark.parametrize(("probability", "confidence"), WRONG)
+def test_a_probability_or_confidence_in_percent_is_refused(probability, confidence):
+    values = np.arange(1000.0)
+    for asked in (
+        lambda: quantile(values, probability, confidence),
+        lambda: quantile_ranks(values.size, probability, confidence),
+        lambda: summarize(values, probabilities=(probability,), confidence=confidence),
+    ):
+        with pytest.raises(ValueError, match="does not lie between 0 and 1"):
+            asked()
