@@ -102,7 +102,7 @@ class DispersionSection(Section):
 
     unit: Line | None = Field(default=None, description="unit of the numbers here; default: the parameter's own")
     levels: int | None = Field(
-        default=None, ge=2, le=MOST_LEVELS, description="for grid and one_at_a_time: number of equally spaced levels"
+        default=None, ge=2, le=MOST_LEVELS, description="equally spaced levels, for grid or one_at_a_time (default: 2)"
     )
     values: list[Value] | None = Field(
         default=None, min_length=1, description="for grid and one_at_a_time: the levels; for discrete: the values"
