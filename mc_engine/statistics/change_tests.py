@@ -18,7 +18,8 @@ assume independent cases, so for `lhs` and `sobol` they are conservative.
 The size of a change is the shift, or the ratio of spreads, for which the test statistic is zero.  Its interval contains
 all values that the test does not reject (Hodges & Lehmann, Ann. Math. Stat. 34 (1963), 598-611).  A difference of
 fractions has its own interval.  Intervals are not widened for the number of comparisons.  For pairs, shifts are those
-of the pairs that differ.  Of more than `MOST_CASES` numbers, that many are tested, selected evenly.
+of the pairs that differ.  Of more than `MOST_CASES` numbers, or pairs that differ, that many are tested, selected
+evenly.
 
 Wilcoxon, Biometrics Bull. 1 (1945), 80-83; Wilcox, Psychometrika 54 (1989), 305-315 (spread of pairs by distances);
 van der Waerden, Indag. Math. 14 (1952), 453-458; Chernoff & Savage, Ann. Math. Stat. 29 (1958), 972-994 (its power);
@@ -153,17 +154,18 @@ def metric_change(
         return MetricChange(metric, used, tried, 0 if paired else None, *by_run, UNKNOWN, UNKNOWN, np.nan, np.nan)
     scale = float(np.abs(both).max())
     unit = max(tolerance * float(a.std()), _ROUNDING * scale)
-    differing = int(np.count_nonzero(np.abs(b - a) > unit)) if paired else None
+    moved = (b - a)[np.abs(b - a) > unit] if paired else None
+    differing = None if moved is None else moved.size
     described = metric, used, tried, differing, *by_run
     if min(used) < FEWEST:
         shift = Estimate(float(in_units(mean[1] - mean[0], exponent)), -inf, inf)
         return MetricChange(*described, shift, UNKNOWN, np.nan, np.nan)
-    a, b = (values[picked_rows(values.size, MOST_CASES)] for values in (a, b))
     z = float(norm.ppf(0.5 + 0.5 * confidence))
     if max(np.ptp(a), np.ptp(b), abs(a[0] - b[0])) <= unit:  # the same constant
         same = float(in_units(float(np.median(b) - np.median(a)), exponent))
         return MetricChange(*described, Estimate(same, same, same), UNKNOWN, np.nan, np.nan)
-    shift, shift_p = _shift(a, b, paired, unit, z)
+    a, b = _picked(a), _picked(b)
+    shift, shift_p = _shift(a, b, unit, z) if moved is None else _shift_of_pairs(_picked(moved), unit, z)
     ratio, spread_p = _spread_ratio(a, b, paired, unit, z)
     if min(deviation) <= _ROUNDING * scale:
         ratio = UNKNOWN
@@ -207,12 +209,18 @@ def _deviation(values: np.ndarray) -> float:
     return float(values.std(ddof=1)) if values.size > 1 else 0.0
 
 
-def _shift(a: np.ndarray, b: np.ndarray, paired: bool, unit: float, z: float) -> tuple[Estimate, float]:
-    """The shift with its interval, and the p-value of none."""
-    if not paired:
-        start, step = float(np.median(b) - np.median(a)), float(a.std() + b.std()) / sqrt(min(a.size, b.size)) + unit
-        return _inverted(lambda shift: _normal_scores(a, b - shift), start, step, z)
-    moved = (b - a)[np.abs(b - a) > unit]
+def _picked(values: np.ndarray) -> np.ndarray:
+    return values[picked_rows(values.size, MOST_CASES)]
+
+
+def _shift(a: np.ndarray, b: np.ndarray, unit: float, z: float) -> tuple[Estimate, float]:
+    """The shift of independent samples with its interval, and the p-value of none."""
+    start, step = float(np.median(b) - np.median(a)), float(a.std() + b.std()) / sqrt(min(a.size, b.size)) + unit
+    return _inverted(lambda shift: _normal_scores(a, b - shift), start, step, z)
+
+
+def _shift_of_pairs(moved: np.ndarray, unit: float, z: float) -> tuple[Estimate, float]:
+    """The shift from the differences of the pairs that differ.  They may be few of very many cases."""
     if not moved.size:
         return Estimate(0.0, 0.0, 0.0), 1.0
     step = float(moved.std()) / sqrt(moved.size) + unit

@@ -16,7 +16,15 @@ import pandas as pd
 from mc_engine.campaign.parts import COMPLETED
 from mc_engine.errors import EngineError
 from mc_engine.section import ReportSection
-from mc_engine.statistics.change_tests import MetricChange, ShareChange, finite, holm, metric_change, share_change
+from mc_engine.statistics.change_tests import (
+    MOST_CASES,
+    MetricChange,
+    ShareChange,
+    finite,
+    holm,
+    metric_change,
+    share_change,
+)
 from mc_engine.statistics.limits import inside_all
 from mc_engine.statistics.requirements import (
     FAIL,
@@ -133,6 +141,15 @@ class Comparison:
         """What holds for the metrics of `same`."""
         lacking = any(metric.same and min(metric.n_used) < max(metric.n_tried) for metric in self.metrics)
         return "the same in both runs" + ", in the cases with a number in both" * lacking
+
+    def selection_words(self, counted: Callable[[int], str]) -> str:
+        """On metrics of which not all numbers are tested; empty without any.  counted : how a number is written."""
+        if all(max(change.n_used) <= MOST_CASES for change in self.moved):
+            return ""
+        return (
+            f"shifts and spreads of more than {counted(MOST_CASES)} numbers (shifts in pairs: of that many pairs that "
+            "differ) are computed from that many, selected evenly"
+        )
 
     @property
     def absent(self) -> tuple[str, ...]:

@@ -80,6 +80,8 @@ def _metric_table(comparison: Comparison) -> Iterator[str]:
     if some:
         pairs = [f"{change.metric} ({change.differing:,} of {change.n_used[0]:,})" for change in some]
         yield f"shift of the pairs that differ, not of all: {', '.join(pairs)}"
+    if selection := comparison.selection_words("{:,}".format):
+        yield selection
     if any(_TIES in row for row in rows):
         yield f"{_TIES}: so many cases have equal values that the size of a significant change is hidden; see --report"
     if any(_NO_INTERVAL in cell for row in rows for cell in row):

@@ -226,6 +226,8 @@ def _metric_blocks(comparison: Comparison, units: Mapping[str, str]) -> Iterator
         yield change_figure(comparison, drawn)
     if moved:
         yield _metric_table(comparison, units, moved)
+    if selection := comparison.selection_words(count):
+        yield f"{selection.capitalize()}."
     if comparison.same:
         yield f"{comparison.same_words.capitalize()}: {_listed(comparison, comparison.same)}."
     if comparison.absent:

@@ -238,3 +238,18 @@ def test_a_shift_far_below_the_error_of_one_case_is_found_in_pairs():
     a = normal("a", 1)
     change = metric_change("y", a, a + 2e-6, paired=True)
     assert change.shift.value == pytest.approx(2e-6, rel=1e-3)
+
+
+def test_a_few_of_very_many_pairs_that_all_move_one_way_are_found():
+    """As after a change of code that concerns 40 of half a million cases."""
+    random = np.random.default_rng(2)
+    before = random.normal(size=500_000)
+    after = before.copy()
+    moved = random.choice(before.size, 40, replace=False)
+    after[moved] += random.uniform(0.5, 1.5, 40)
+    change = metric_change("x", before, after, paired=True)
+    exact = wilcoxon((after - before)[moved], method="approx").pvalue
+    assert change.differing == 40
+    assert change.shift_p == pytest.approx(exact, rel=0.5)
+    assert change.shift.lower < np.median((after - before)[moved]) < change.shift.upper
+    assert metric_change("flag", 0.0 * before, 1.0 * (after != before), paired=True).shift_p < 1e-6

@@ -163,6 +163,17 @@ def test_a_shift_of_some_pairs_is_not_told_as_one_of_all_cases(tmp_path):
     assert not [line for line in comparison_lines(unpaired) if line.startswith("shift of the pairs")]
 
 
+def test_a_comparison_says_when_it_tests_a_selection_of_the_numbers(tmp_path, monkeypatch):
+    found = compared(run(tmp_path / "a"), run(tmp_path / "b", shift=0.4))
+    told = (
+        "ore than 399 numbers (shifts in pairs: of that many pairs that differ) are computed from that many, selected"
+    )
+    assert told not in "\n".join(comparison_lines(found)) + str(build_comparison(found))
+    monkeypatch.setattr("mc_engine.studies.comparison.MOST_CASES", 399)
+    assert told in "\n".join(comparison_lines(found))
+    assert told in str(build_comparison(found))
+
+
 def test_what_changed_in_code_and_campaign_is_told(tmp_path):
     changes = {
         "engine": "0.3.0",
