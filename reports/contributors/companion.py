@@ -48,9 +48,14 @@ def _effect_figure(flown: Flown, contributions: Contributions, shown: list[str])
     of = used_of([contributions.n_used[metric] for metric in shown], contributions.n_tried)
     of_blocks = f"{of} blocks of cases flown for this purpose"
     fitted = any(row.total is not None for metric in shown for row in contributions.by_metric[metric])
-    of_cases = f"from a surrogate model of {of} cases" if fitted else f"from {of} cases"
+    of_cases = f"from {'a surrogate model of ' * fitted}{of} cases{_selected(flown, contributions)}"
     source = f"from {of_blocks}" if contributions.trends is None else of_cases
     return contributor_figure(flown, [(flown.words(item), contributions.by_metric[item]) for item in shown], source)
+
+
+def _selected(flown: Flown, contributions: Contributions) -> str:
+    """What follows "cases" where effects are estimated from some of them."""
+    return f", selected evenly from the {count(flown.n_tried)}" if contributions.n_tried < flown.n_tried else ""
 
 
 def _effect_table(flown: Flown, contributions: Contributions, shown: list[str]) -> Table:
@@ -154,10 +159,11 @@ def _note(flown: Flown, contributions: Contributions, shown: list[str]) -> str:
         "includes. With a section [sensitivity] in the campaign file, flights of their own compute what the random "
         "draws contribute. "
     ) * any(row.input == UNEXPLAINED for row in rows)
+    selected = f"{count(contributions.n_tried)} cases{chosen}" if (chosen := _selected(flown, contributions)) else ""
     note = (
-        f"Estimated from the table of cases. {unexplained}{each} First-order effects are those of bins of an input: "
-        "one that is due to a jump or a long tail of the metric within a bin is found too small, beyond its interval. "
-        "SRC, PRCC and Spearman: trends with their direction. "
+        f"Estimated from {selected or 'the table of cases'}. {unexplained}{each} First-order effects "
+        "are those of bins of an input: one that is due to a jump or a long tail of the metric within a bin is "
+        "found too small, beyond its interval. SRC, PRCC and Spearman: trends with their direction. "
         "R²: fraction of the variance that the linear regression behind SRC explains."
     )
     correlated = _correlated(contributions)

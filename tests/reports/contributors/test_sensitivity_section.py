@@ -239,3 +239,12 @@ def test_of_sobol_points_no_pair_is_tested_for_failures_and_the_page_says_so():
     found = said(section(run))
     assert "Pairs of inputs are not tested for contributors to failures: Sobol’ points are not independent" in found
     assert "no pair of inputs" not in found
+
+
+def test_the_figure_and_the_table_say_that_contributors_come_from_a_selection_of_the_cases(monkeypatch, drawn):
+    monkeypatch.setattr("reports.run.contributions.MOST_ROWS", 1000)
+    found = section(synthetic_run(4000, failed=12))
+    selected = "1\u202f000 cases, selected evenly from the 4\u202f000"
+    assert selected in block(found, FigureBlock).caption
+    assert "selected evenly" in block(found, Table, "Contributors to each metric").note
+    assert "selected evenly" not in block(drawn, FigureBlock).caption
