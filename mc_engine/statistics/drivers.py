@@ -101,18 +101,21 @@ def failure_drivers(inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray],
     undecided = tuple(name for k, name in enumerate(names) if k not in decided)
     if not decided:
         return Drivers((), (), 0, 0, undecided, fewest)
-    columns = input_columns(inputs)
-    known = np.any([np.isfinite(column.values) for column in columns], axis=0)
-    rows = _tested_rows(every[decided], np.broadcast_to(known, every.shape[1]))
-    columns = [column.at(rows) for column in columns]
-    tested = {names[k]: every[k, rows] for k in decided}
-    singles = list(_single_tests(columns, tested, fewest))
-    columns = [column for column in columns if column.varies and np.isfinite(column.values).all()]
-    rich = {name: lost for name, lost in tested.items() if not sobol and _fewer_group(lost) >= FEWEST_FOR_PAIRS}
-    pairs = list(_pair_tests(columns, rich)) if rich and len(columns) > 1 else []
-    by_name = {column.name: column for column in columns}
+    whole = input_columns(inputs)
+    known = np.flatnonzero(np.broadcast_to(np.any([np.isfinite(one.values) for one in whole], axis=0), every.shape[1]))
+    whole, every = [column.at(known) for column in whole], every[:, known]
+    complete = {column.name: column for column in whole if np.isfinite(column.values).all()}
+    singles: list[Driver] = []
+    pairs: list[Driver] = []
+    for group in [decided] if len(known) <= MOST_ROWS else [[k] for k in decided]:
+        rows = _tested_rows(every[group[0]])
+        columns, tested = [column.at(rows) for column in whole], {names[k]: every[k, rows] for k in group}
+        singles += _single_tests(columns, tested, fewest)
+        columns = [column for column in columns if column.varies and column.name in complete]
+        rich = {name: lost for name, lost in tested.items() if not sobol and _fewer_group(lost) >= FEWEST_FOR_PAIRS}
+        pairs += _pair_tests(columns, rich) if rich and len(columns) > 1 else []
     located = tuple(
-        _located(pair, by_name[pair.inputs[0]], by_name[pair.inputs[1]], rich[pair.requirement])
+        _located(pair, complete[pair.inputs[0]], complete[pair.inputs[1]], every[names.index(pair.requirement)])
         for pair in _discovered(pairs)
     )
     return Drivers(_discovered(singles), located, len(singles), len(pairs), undecided, fewest)
@@ -161,16 +164,15 @@ def _single_tests(columns: Sequence[InputColumn], failed: Mapping[str, np.ndarra
                 yield _rank_test(name, part, lost[rows])
 
 
-def _tested_rows(failed: np.ndarray, usable: np.ndarray) -> np.ndarray:
+def _tested_rows(failed: np.ndarray) -> np.ndarray:
     """Rows of the cases that are tested: all, or of very many some of the failed and some of the others.
 
-    The test compares two groups, so their sizes do not bias it.
+    failed : bool[n], of one requirement.  The test compares two groups, so their sizes do not bias it.  A selection by
+    several requirements would: the cases that one of them passes would have more failures of the others.
     """
-    rows = np.flatnonzero(usable)
-    if rows.size <= MOST_ROWS:
-        return rows
-    lost = failed[:, rows].any(axis=0)
-    groups = rows[lost], rows[~lost]
+    if failed.size <= MOST_ROWS:
+        return np.arange(failed.size)
+    groups = np.flatnonzero(failed), np.flatnonzero(~failed)
     return np.sort(np.concatenate([group[picked_rows(group.size, MOST_ROWS // 2)] for group in groups]))
 
 
@@ -323,7 +325,10 @@ def _studentised(product: np.ndarray, freed: np.ndarray, factor: float) -> np.nd
 
 
 def _located(driver: Driver, first: InputColumn, second: InputColumn, failed: np.ndarray) -> Driver:
-    """The pair with the cell of the two inputs where the largest share of cases fails, and how far it separates."""
+    """The pair with the cell of the two inputs where the largest share of cases fails, and how far it separates.
+
+    It is counted in all cases: a selection has another ratio of failed cases to others.
+    """
     (row, n_rows), (place, n_places) = equal_bins(first, 3), equal_bins(second, 3)
     cell = row * n_places + place
     tried = np.bincount(cell, minlength=n_rows * n_places)

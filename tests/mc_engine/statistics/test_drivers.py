@@ -117,16 +117,15 @@ def test_a_level_that_spares_cases_is_named_and_its_p_value_is_fishers():
 
 
 def test_of_very_many_cases_all_failed_ones_are_tested_and_an_even_choice_of_the_others():
-    failed = np.zeros((2, 60_000), dtype=bool)
-    failed[0, 7::4000], failed[1, 11::3000] = True, True
-    usable = np.arange(60_000) != 7
-    rows = _tested_rows(failed, usable)
-    lost = np.flatnonzero(failed.any(axis=0) & usable)
+    failed = np.zeros(60_000, dtype=bool)
+    failed[7::4000] = True
+    rows = _tested_rows(failed)
+    lost = np.flatnonzero(failed)
     assert np.isin(lost, rows).all()
     assert rows.size == lost.size + MOST_ROWS // 2
     assert (np.diff(rows) > 0).all()
     assert np.diff(rows).max() <= 12  # one of each six
-    assert _tested_rows(failed[:, :MOST_ROWS], usable[:MOST_ROWS]).size == MOST_ROWS - 1
+    assert _tested_rows(failed[:MOST_ROWS]).size == MOST_ROWS
 
 
 def test_failures_at_both_ends_are_so_named_where_one_end_has_more_of_them():
@@ -194,3 +193,22 @@ def test_cases_without_an_input_are_tested_by_the_others():
     assert where["reach", "reach"] == ("high", 1.0)
     assert found.singles_tested == 5
     assert {driver.inputs for driver in found.pairs} <= {("angle", "drag")}
+
+
+def test_failed_cases_of_a_cell_are_counted_in_all_cases_of_a_large_run():
+    """Three in ten cases of one cell of nine fail, as many as in any selection of cases by chance."""
+    random = np.random.default_rng(1)
+    x, y, chance = random.random((3, 60_000))
+    cell = (x > 2.0 / 3.0) & (y > 2.0 / 3.0)
+    failed = cell & (chance < 0.3)
+    (pair,) = failure_drivers({"x": x, "y": y}, {"r": failed}).pairs
+    assert pair.where == ("high", "high")
+    assert pair.inside_failed == pytest.approx(failed.sum(), rel=0.02)
+    assert pair.inside_tried == pytest.approx(cell.sum(), rel=0.02)
+    assert pair.effect == pytest.approx(1.0 - (cell & ~failed).sum() / (~failed).sum(), abs=0.02)
+
+
+def test_in_a_large_run_the_failures_of_one_requirement_make_no_contributor_to_another():
+    x, chance = np.random.default_rng(1).random((2, 60_000))
+    found = failure_drivers({"x": x}, {"by chance": chance < 0.02, "by x": x > 0.9}).singles
+    assert [one.requirement for one in found] == ["by x"]
