@@ -6,10 +6,14 @@ one branch and `State(s.v, s.x)` in the other, or begin a loop with a record of 
 A field that is left out has the default of its class, as in Python.  A field may be a record.  `replace`, `merged` and
 `where` for records are implemented here.
 
+A tuple of plain numbers and lanes, such as (t, s.x), is looped over and looked up as one of lanes.
+
 Compiled code reads the attributes of classes and of `SimpleNamespace` as constants, as it does those of modules.
 """
 
 import inspect
+import operator
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,11 +21,12 @@ from numba import typeof, types
 from numba.core import utils
 from numba.core.registry import cpu_target
 from numba.core.typing.collections import NamedTupleClassAttribute
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.core.typing.templates import AbstractTemplate, infer, infer_global, signature
 from numba.core.typing.typeof import typeof_impl
 from numba.extending import lower_builtin, lower_cast
 
 from mc_engine.lanes import functions
+from mc_engine.lanes.lane_type import common_width, is_mask, is_number, mask_type, number_type
 
 _HEAP_TYPE = 1 << 9  # set of a class that is made by a statement, Py_TPFLAGS_HEAPTYPE
 _type_of_class = typeof_impl.dispatch(type)
@@ -174,6 +179,50 @@ def _lower_where(context, builder, sig, args):
         cast = [context.cast(builder, *conversion) for conversion in zip(values, given, own.args, strict=True)]
         fields.append(context.get_function(function, own)(builder, cast))
     return context.make_tuple(builder, sig.return_type, fields)
+
+
+# ---- tuples of plain numbers and lanes
+
+
+def _even(ty: Any) -> Any:
+    """The type of a tuple that a mixed one is converted to where that makes all its fields of one type, else itself."""
+    if not isinstance(ty, types.Tuple | types.NamedTuple):
+        return ty
+    even = _in_lanes(ty, common_width(*_leaves(ty)))
+    return even if isinstance(even, types.IterableType) else ty
+
+
+def _leaves(ty: Any) -> list[Any]:
+    return [leaf for field in _fields_of(ty) for leaf in _leaves(field)] if _fields_of(ty) else [ty]
+
+
+def _in_lanes(ty: Any, width: int) -> Any:
+    """A type with lanes in place of plain numbers and truth values."""
+    if _fields_of(ty):
+        fields = [_in_lanes(field, width) for field in ty]
+        return types.BaseTuple.from_types(fields, getattr(ty, "instance_class", None))
+    return number_type(width) if is_number(ty) else mask_type(width) if is_mask(ty) else ty
+
+
+def _fields_of(ty: Any) -> Any:
+    return ty if isinstance(ty, types.BaseTuple) else ()
+
+
+def _take_mixed(function: Any, add: Callable[[Any], Any]) -> None:
+    """Let numba type a function that it knows for tuples of one type of fields on mixed ones, too."""
+
+    @add
+    class Typing(AbstractTemplate):
+        key = function
+
+        def generic(self, args, kws):
+            even = tuple(_even(ty) for ty in args)
+            return self.context.resolve_function_type(function, even, kws) if even != args else None
+
+
+_take_mixed("getiter", infer)
+for _function in (operator.getitem, enumerate, zip):
+    _take_mixed(_function, infer_global(_function))
 
 
 # ---- classes and namespaces

@@ -65,6 +65,22 @@ def test_what_depends_on_time_alone_is_computed_once_for_all_lanes(monkeypatch):
     assert "@llvm.rint.v8f64" not in code
 
 
+def test_a_force_may_loop_over_the_time_and_the_state(tmp_path):
+    text = (FOLDER / "pushed_spring.py").read_text()
+    looped = text.replace("v=sin(t) - p.frequency * p.frequency * s.x", "v=force")
+    looped = looped.replace(
+        "def rhs(t, s, p):\n",
+        """def rhs(t, s, p):
+    force, terms = sin(t), (t, s.x, p.frequency * p.frequency)
+    for i in range(1, 2):
+        force = force - terms[i + 1] * terms[i]
+""",
+    )
+    (tmp_path / "looped.py").write_text(looped)
+    frequencies = np.linspace(1.0, 3.0, 8)
+    same_bytes(*(flown(m, frequency_rad_s=frequencies) for m in (PUSHED, load_model("looped.py", tmp_path))))
+
+
 def test_a_case_keeps_its_bytes_in_any_order_among_any_cases():
     whole = flown(OSCILLATOR, **MIXED)
     order = np.random.default_rng(1).permutation(37)

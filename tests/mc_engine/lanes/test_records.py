@@ -55,6 +55,35 @@ def test_kernels_of_every_width_make_records_as_python_does(function):
     np.testing.assert_array_equal([function(*pair) for pair in zip(x, y, strict=True)], np.transpose(expected))
 
 
+@physics
+def looped(x, y):
+    total = 0.0
+    for v in (1.0, x, y):
+        total = total + v
+    for u, v in ((x, 2), (1.0, y)):
+        total = total * v - u
+    for i, (u, v) in enumerate(zip((1, x), (y, x))):  # noqa: B905 -- kernels know no `strict`
+        total = total + i * u * v
+    return total, total
+
+
+@physics
+def looked_up(x, y):
+    total, pair, mixed = 0.0, Pair(a=x), (2, y, 3.0)
+    for i in range(2):
+        total = total + pair[i] * mixed[i + 1] - mixed[i]
+    for is_true in (x > 0.0, pair.b > 2.5):
+        total = where(is_true, total, -total)
+    return total, total
+
+
+@pytest.mark.parametrize("function", [looped, looked_up])
+def test_a_loop_over_plain_numbers_and_lanes_is_one_over_numbers(function):
+    x, y = np.random.default_rng(1).normal(size=(2, 50))
+    expected = function(x, y)
+    np.testing.assert_array_equal(by_every_width(function, 2, x, y), expected)
+
+
 def test_a_field_that_the_record_has_not_is_refused():
     with pytest.raises(ModelError, match=r'Pair\(...\) has no field "bb"; did you mean "b"?'):
         replace(Pair(), bb=1.0)
