@@ -12,6 +12,7 @@ from mc_engine.campaign.parts import rank_pairs
 from mc_engine.campaign.sensitivity_design import DESIGN as PICK_FREEZE
 from mc_engine.campaign.sensitivity_design import companion_table, names_a_draw, upstream_ids
 from mc_engine.errors import CampaignError, Problem
+from mc_engine.model.fields import Setting
 from mc_engine.sampling.designs import BY_LEVELS, EXTENSIBLE, grid_levels, one_at_a_time_levels, unit_cube
 from mc_engine.sampling.distributions import column, quantiles
 from mc_engine.units import convert
@@ -102,6 +103,7 @@ def dispersion_records(campaign: Campaign) -> list[dict[str, Any]]:
     """One plain record for each dispersion, for manifest and report: name, unit, nominal, distribution, bounds, source.
 
     random_draw : true for a dispersion that only selects a random draw; absent for all others.
+    choices : of a setting that is a word, the words in the model's order; absent for all others.
     """
     records = []
     for dispersion in campaign.dispersions:
@@ -117,6 +119,7 @@ def dispersion_records(campaign: Campaign) -> list[dict[str, Any]]:
                 "source": dispersion.source,
                 "note": dispersion.note,
                 **({"random_draw": True} if names_a_draw(campaign.model, dispersion.name) else {}),
+                **({"choices": list(item.choices)} if isinstance(item, Setting) and item.choices else {}),
             }
         )
     return records

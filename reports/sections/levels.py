@@ -29,13 +29,14 @@ def level_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
 
 
 def _levels(flown: Flown, name: str) -> list[str]:
-    """The nominal level first, then the others as they come in the table; none for numbers."""
+    """The nominal level first, then the others as the model lists its choices, else as they come; none for numbers."""
     column = flown.cases[name]
     if infer_dtype(column, skipna=False) != "string":
         return []
-    levels = list(dict.fromkeys(column))
-    nominal = str(flown.nominal.get(name))
-    levels.sort(key=lambda level: level != nominal)
+    records = [record for record in flown.manifest.get("inputs", []) if record["name"] == name]
+    order = [flown.nominal.get(name), *(word for record in records for word in record.get("choices", []))]
+    flown_here = dict.fromkeys(column)
+    levels = list(dict.fromkeys([*(level for level in order if level in flown_here), *flown_here]))
     return levels if len(levels) <= MOST_LEVELS else []
 
 

@@ -107,6 +107,11 @@ def test_records_say_each_dispersion_as_its_review_table_would():
     assert texts["control"] == ("discrete, values = off, clipped, weights = 1, 3", "")
 
 
+def test_the_record_of_a_word_names_its_choices_in_the_order_of_the_model():
+    (record,) = dispersion_records(load('[dispersion.control]\nvalues = ["off", "continuous", "clipped"]\n', "grid"))
+    assert record["choices"] == ["continuous", "clipped", "off"]
+
+
 def test_the_bounds_of_levels_are_not_a_further_level():
     """The text "3 levels: 1, 2, 3 s, 1 to 3 s" read as four of them."""
     (record,) = dispersion_records(load("[dispersion.delay_s]\nlower = 1\nupper = 3\nlevels = 3\n", "grid"))

@@ -41,6 +41,12 @@ def test_pairs_bring_out_the_shift_of_each_level():
     assert {row[1].text for row in rows.values()} == {"200 / 200"}
 
 
+def test_levels_stand_in_the_order_of_the_models_choices_after_the_nominal_one():
+    run = flown(inputs=[{"name": "law", "choices": ["two", "none", "not flown", "one"]}])
+    _, tables = choices(build(run, "run"))
+    assert [row[0].text for row in tables["Peak load [g] by law"].rows] == ["none", "two", "one"]
+
+
 def test_the_figure_holds_the_quantiles_of_each_level():
     run = flown()
     figure, _ = choices(build(run, "run"))
