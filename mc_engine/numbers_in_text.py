@@ -5,13 +5,13 @@ Python itself would also accept 1_0, digits of other scripts, nan and infinity.
 
 import re
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
-from math import floor, log10
+from math import floor, isfinite, log10
 
 LARGEST_WHOLE = 2**63 - 1
 LEAST_SHARE = 1e-12  # and 1 less it is the most: beyond, 1 - share has too few digits
 
 _SLACK = Decimal("1e-6")  # of a last digit: a number nearer to a printed one differs from it by rounding alone
-_GIVEN_DIGITS = 14  # of a share that is printed as it was given; a double's last ones are rounding
+MOST_GIVEN = 14  # digits of a number that somebody wrote; a double's last ones are rounding, or of a conversion
 
 _WHOLE = re.compile(r"[+-]?[0-9]{1,30}")
 _REAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,9})?")
@@ -39,7 +39,7 @@ def counted(number: int, noun: str) -> str:
 
 def percent_digits(share: float) -> str:
     """A given fraction in percent, with all its digits: 99.996833 for 0.99996833."""
-    return f"{(Decimal(f'{share:.{_GIVEN_DIGITS}g}') * 100).normalize():f}"
+    return f"{(Decimal(f'{share:.{MOST_GIVEN}g}') * 100).normalize():f}"
 
 
 def outward(value: float, decimals: int, up: bool) -> float:
@@ -52,3 +52,11 @@ def outward(value: float, decimals: int, up: bool) -> float:
 def decimals_of(value: float, digits: int) -> int:
     """The decimals with which a finite number has so many significant digits; negative for large numbers."""
     return digits - 1 - floor(log10(abs(value))) if value else 0
+
+
+def digits_within(low: float, high: float, least: int = 5) -> int:
+    """The significant digits that show a thousandth of a range, as of temperatures from 300.01 to 300.02 K."""
+    size, width = max(abs(low), abs(high)), high - low
+    if not isfinite(size) or not isfinite(width) or not width > 0.0:
+        return least
+    return min(max(3 + floor(log10(size)) - floor(log10(width)), least), MOST_GIVEN)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mc_engine.numbers_in_text import counted
+from mc_engine.numbers_in_text import counted, digits_within
 from mc_engine.store.result_folder import read_result
 from mc_engine.store.run_files import TUNING, path_of
 
@@ -78,10 +78,9 @@ def tuning_lines(record: TuningRecord) -> list[str]:
     lines.append(f"front        {front_words(record, '{:,}'.format)}")
     units = record.front.attrs["units"]
     for objective in tuning["objectives"]:
-        values = record.front[objective["name"]]
-        lines.append(
-            f"  {objective['name']}  {values.min():.6g} to {values.max():.6g} {units[objective['name']]}".rstrip()
-        )
+        ends = (values := record.front[objective["name"]]).min(), values.max()
+        low, high = (f"{end:.{digits_within(*ends, least=6)}g}" for end in ends)
+        lines.append(f"  {objective['name']}  {low} to {high} {units[objective['name']]}".rstrip())
     not_searched = requirements_not_searched(record)
     return [*lines, f"note         {not_searched}"] if not_searched else lines
 

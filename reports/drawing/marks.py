@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from mc_engine.numbers_in_text import digits_within
 from mc_engine.statistics.summary import nearly_equal
 from reports.drawing.palette import CIVIDIS, PAPER, blended
-from reports.text.numbers import digits_within, number
+from reports.text.numbers import number
 
 MARGIN = 0.04  # of an axis, beyond the marks on it
 FIELD_EDGE = "rgba(255,255,255,0.55)"  # between the regions of a field

@@ -6,11 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from mc_engine.numbers_in_text import digits_within
 from mc_engine.statistics import Quantile, Summary
 from mc_engine.statistics.summary import nearly_equal
 from reports.drawing.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot
 from reports.drawing.palette import BLUE, GREEN, INK, ORANGE, SKY, VERMILION
-from reports.text.numbers import count, counted, digits_within, given_percent, interval, limit_number, number
+from reports.text.numbers import count, counted, given_percent, interval, limit_number, number
 
 FEWEST_BINS, MOST_BINS = 8, 48
 CENTRAL = (0.005, 0.995)  # what a histogram must show well

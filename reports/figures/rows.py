@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mc_engine.numbers_in_text import digits_within
 from reports.drawing.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot, Points, finite, intervals, names_axis
 from reports.drawing.palette import BLUE, GREEN, INK, MUTED, ORANGE, PAPER, SKY, VERMILION
 from reports.drawing.ticks import MOST_TICKS
-from reports.text.numbers import SPACE, count, digits_within, number
+from reports.text.numbers import SPACE, count, number
 
 MOST_MARGIN = 1.0  # of the reach of the limits, either way; margins beyond are drawn at the edge
 ROWS_TOGETHER = 16  # of a panel of margins: with names of four lines it fits on a page

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from mc_engine.numbers_in_text import digits_within
 from mc_engine.studies.tuning_folder import TuningRecord
 from reports.text.numbers import axis_label, exact, given_percent, number, with_unit, words
 
@@ -55,6 +56,12 @@ class Tuned:
 
     def with_unit(self, name: str, value: float) -> str:
         return with_unit(number(value, 4), self.units[name])
+
+    def ends(self, name: str) -> tuple[str, str]:
+        """The smallest and the largest value on the front, in digits that tell them apart."""
+        ends = float(self.best[name].min()), float(self.best[name].max())
+        digits = digits_within(*ends, least=4)
+        return number(ends[0], digits), number(ends[1], digits)
 
 
 def inside(values: np.ndarray, constraint: Mapping[str, Any]) -> np.ndarray:

@@ -28,7 +28,7 @@ from reports.studies.tuning_tables import (
     provenance_table,
     published_table,
 )
-from reports.text.numbers import SPACE, count, counted
+from reports.text.numbers import SPACE, count, counted, with_unit
 from reports.text.source_places import of_source
 
 GLOSSARY = Terms(
@@ -133,7 +133,7 @@ def _objective_cards(tuned: Tuned) -> Iterator[Card]:
             continue
         if not tuned.record.feasible:  # what no allowed candidate reaches is no result
             continue
-        ends = [tuned.with_unit(objective["name"], float(end)) for end in (values.min(), values.max())]
+        ends = [with_unit(end, tuned.units[objective["name"]]) for end in tuned.ends(objective["name"])]
         small = objective["goal"] == "minimise"
         best, other = ends if small else ends[::-1]
         yield Card(

@@ -115,8 +115,7 @@ def parameter_table(tuned: Tuned) -> Table:
     rows = []
     for parameter in tuned.plan["parameters"]:
         name = parameter["name"]
-        values = tuned.best[name]
-        on_front = f"{number(float(values.min()), 4)} to {number(float(values.max()), 4)}" if len(values) else "–"
+        on_front = " to ".join(tuned.ends(name)) if len(tuned.best) else "–"
         cells = [Cell(exact(parameter[key]), float(parameter[key])) for key in ("lower", "upper")]
         label = Cell(axis_label(name, tuned.units[name]), small=tuned.descriptions[name])
         nominal = Cell(exact(parameter["nominal"]), float(parameter["nominal"]))

@@ -7,7 +7,7 @@ from functools import partial
 from itertools import pairwise
 from math import floor, isfinite, log10
 
-from mc_engine.numbers_in_text import decimals_of, outward, percent_digits
+from mc_engine.numbers_in_text import MOST_GIVEN, decimals_of, outward, percent_digits
 from mc_engine.statistics.summary import nearly_equal
 from mc_engine.units import UNITS, unit_suffix
 
@@ -15,7 +15,6 @@ NO_BREAK = "\N{NO-BREAK SPACE}"
 SPACE = "\u202f"  # narrow, no-break: groups digits and stands before a unit
 MOST_DIGITS = 8  # of one number in a table
 MOST_BESIDE = 11  # of one whose spread is told beside it: a Julian date to some seconds
-MOST_GIVEN = 14  # of a limit that somebody wrote; more are of a conversion
 LONGEST_SYMBOL = 3  # letters
 LONGEST_LABEL = 44  # letters of an axis label, without its unit
 SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
@@ -74,14 +73,6 @@ def number(value: float | None, digits: int = 5, scale: float | None = None, up:
     if not text.strip("0."):
         return "0"
     return _trim(text) if scale is None else text
-
-
-def digits_within(low: float, high: float, least: int = 5) -> int:
-    """The significant digits that show a thousandth of a range, as of temperatures from 300.01 to 300.02 K."""
-    size, width = max(abs(low), abs(high)), high - low
-    if not isfinite(size) or not isfinite(width) or not width > 0.0:
-        return least
-    return min(max(3 + floor(log10(size)) - floor(log10(width)), least), MOST_GIVEN)
 
 
 def limit_number(value: float) -> str:

@@ -16,6 +16,7 @@ from reports.drawing.marks import Points
 from reports.formats.html import render_html
 from reports.formats.pdf import render_pdf
 from reports.studies.tuning import build_tuning
+from reports.text.numbers import SPACE
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +73,22 @@ def test_no_table_of_the_source_reads_like_a_table_of_the_report(document):
     constraint = table(document, "Objectives and constraints").rows[-1]
     parameter = table(document, "Tuned parameters").rows[0]
     assert (constraint[-1].text, parameter[-1].text) == ("Table 5 of the source", "Table 2 of the source")
+
+
+def test_the_ends_of_a_narrow_front_are_told_apart(record):
+    """7827.2131 and 7827.2141 m/s both read 7827 on the page and 7827.21 on the command line."""
+    front = record.front.assign(cost=7827.2131 + 0.001 * record.front["cost"], gain=100.0 + 1e-3 * record.front["gain"])
+    front.attrs = record.front.attrs
+    narrow = replace(record, front=front)
+    document = build_tuning(narrow, "out")
+    best, other = (f"{end:.6f}" for end in (front["cost"].min(), front["cost"].max()))
+    assert float(document.costs[0].answer.split(SPACE)[0]) == pytest.approx(float(best), abs=2e-6)
+    assert float(document.costs[0].detail.split(" to ")[1].split(SPACE)[0]) == pytest.approx(float(other), abs=2e-6)
+    low, high = table(document, "Tuned parameters").rows[0][3].text.split(" to ")
+    assert float(low) < float(high)
+    (line,) = [line for line in tuning_lines(narrow) if line.startswith("  cost")]
+    assert float(line.split()[1]) == pytest.approx(float(best), abs=2e-6)
+    assert float(line.split()[3]) == pytest.approx(float(other), abs=2e-6)
 
 
 def test_the_table_of_the_front_is_the_front(record, document):
