@@ -117,9 +117,9 @@ def infeasibility(record: TuningRecord) -> str:
         value, unit = float(row[constraint["name"]]), units[constraint["name"]]
         for word, limit, sign in (("at most", constraint["at_most"], 1.0), ("at least", constraint["at_least"], -1.0)):
             if limit is not None and sign * (value - limit) > 0.0:
-                broken.append(
-                    f"{constraint['name']} {value:.4g}{' ' * bool(unit)}{unit} where {word} {limit:g} is allowed"
-                )
+                digits = digits_within(min(value, limit), max(value, limit), least=4)
+                reached = f"{value:.{digits}g}{' ' * bool(unit)}{unit}"
+                broken.append(f"{constraint['name']} {reached} where {word} {limit:.12g} is allowed")
     return f"{tried}; the least violation found is {float(row['violation']):.4g}: {', '.join(broken)}"
 
 

@@ -54,9 +54,6 @@ class Tuned:
     def label(self, name: str) -> str:
         return axis_label(words(name, self.units[name]), self.units[name])
 
-    def with_unit(self, name: str, value: float) -> str:
-        return with_unit(number(value, 4), self.units[name])
-
     def ends(self, name: str) -> tuple[str, str]:
         """The smallest and the largest value on the front, in digits that tell them apart."""
         ends = float(self.best[name].min()), float(self.best[name].max())

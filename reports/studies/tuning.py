@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from mc_engine.numbers_in_text import digits_within
 from mc_engine.studies.tuning_folder import (
     UNFINISHED,
     TuningRecord,
@@ -28,7 +29,7 @@ from reports.studies.tuning_tables import (
     provenance_table,
     published_table,
 )
-from reports.text.numbers import SPACE, count, counted, with_unit
+from reports.text.numbers import SPACE, count, counted, number, with_unit
 from reports.text.source_places import of_source
 
 GLOSSARY = Terms(
@@ -114,13 +115,15 @@ def _constraint_cards(tuned: Tuned) -> Iterator[Card]:
         met = int(np.count_nonzero(inside(values, constraint)))
         numbers = values[np.isfinite(values)]
         side = "largest" if constraint["at_most"] is None else "smallest"
-        near = (numbers.max() if side == "largest" else numbers.min()) if numbers.size else np.nan
+        limit = constraint["at_least"] if side == "largest" else constraint["at_most"]
+        near = float(numbers.max() if side == "largest" else numbers.min()) if numbers.size else np.nan
+        found = number(near, digits_within(min(near, limit), max(near, limit), least=4))
         yield Card(
             label=constraint["name"],
             answer="reached" if met else "not reached",
             detail=f"{metric_words(tuned, constraint)} {limit_words(tuned, constraint)}: "
             f"{count(met)} of {count(len(values))} candidates; "
-            f"the {side} found is {tuned.with_unit(constraint['name'], float(near))}.",
+            f"the {side} found is {with_unit(found, tuned.units[constraint['name']])}.",
             tone="good" if met else "bad",
         )
 

@@ -70,7 +70,7 @@ def held_by_bounds(tuned: Tuned) -> list[str]:
             ("upper", values >= parameter["upper"] - spare),
         ):
             if near.all():
-                bound = with_unit(number(parameter[side], 4), tuned.units[name])
+                bound = with_unit(exact(parameter[side]), tuned.units[name])
                 held.append(f"{name} at its {side} one, {bound}")
     return held
 

@@ -91,6 +91,19 @@ def test_the_ends_of_a_narrow_front_are_told_apart(record):
     assert float(line.split()[3]) == pytest.approx(float(other), abs=2e-6)
 
 
+def test_a_limit_that_is_just_missed_is_told_apart_from_what_was_found(tmp_path):
+    """2836.424 s where at most 2836.42 s is allowed read 2836 s, which would have been allowed."""
+    record = synthetic_tuning(tmp_path / "out", limit=-1.0)
+    record.evaluations["limited"] = 2836.424
+    (constraint,) = record.manifest["tuning"]["constraints"]
+    constraint["at_most"] = 2836.42
+    document = build_tuning(record, "out")
+    told = "limited 2836.424 s where at most 2836.42 is allowed"
+    assert told in "\n".join(tuning_lines(record))
+    assert told in document.subtitle
+    assert "smallest found is 2836.424" in document.verdicts[0].detail
+
+
 def test_the_table_of_the_front_is_the_front(record, document):
     rows = table(document, "The front").rows
     shown = [row[0].value for row in rows]
