@@ -370,7 +370,9 @@ def _note(name: str, verdict: Verdict | None, before: Verdict | None) -> str:
         return f"{verdict.name} is the only requirement" if verdict else ""
     if before is None or not verdict.metric:
         return verdict.remark
-    if (before.metric, before.at_least, before.at_most) != (verdict.metric, verdict.at_least, verdict.at_most):
+    if before.metric != verdict.metric:
+        return f"the metric is {verdict.metric}, in A {before.metric}"
+    if (before.at_least, before.at_most) != (verdict.at_least, verdict.at_most):
         return "the limit is different"
     asked, asks = (before.share, before.confidence), (verdict.share, verdict.confidence)
     return "the required probability is different" if asked != asks else ""

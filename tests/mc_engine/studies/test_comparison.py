@@ -47,6 +47,14 @@ def test_counts_by_the_limits_of_one_run_and_of_each_are_told_apart(tmp_path):
     assert verdict.endswith("of 400 cases inside; in B the limit is different")
 
 
+def test_a_requirement_of_another_metric_names_both_metrics(tmp_path):
+    a = run(tmp_path / "a")
+    (record,) = a.manifest["requirements"]
+    b = run(tmp_path / "b", requirements=[{**record, "metric": "range_m", "at_most": 2e6}])
+    line = next(line for line in comparison_lines(compared(a, b)) if line.startswith("requirement fuel"))
+    assert line.endswith("of 400 cases inside; in B the metric is range_m, in A propellant_kg")
+
+
 def test_a_shift_is_found_in_the_metric_that_moved_alone(tmp_path):
     found = compared(run(tmp_path / "a"), run(tmp_path / "b", shift=0.4, noise=2))
     assert [one.metric for one in found.shifted] == ["propellant_kg"]
