@@ -16,6 +16,7 @@ import numpy as np
 from mc_engine.sampling.designs import MORRIS_LEVELS, block_size
 from mc_engine.statistics.input_columns import input_columns
 from mc_engine.statistics.pick_freeze import whole_blocks
+from mc_engine.statistics.picked_cases import picked_rows
 
 FEWEST_BLOCKS = 10
 RESAMPLES = 200
@@ -75,6 +76,13 @@ def designed_indices(
     for name in {"mu", "sigma"}.intersection(names):
         values[name][[not column.ordered for column in columns]] = np.nan
     return DesignedIndices(design, tuple(inputs), tuple(metrics), values, reach, n_used, len(rows))
+
+
+def picked_block_rows(design: str, case_ids: np.ndarray, n_inputs: int, most: int, seed: int = 0) -> np.ndarray:
+    """Rows, int64, ascending, of blocks selected evenly over the case numbers, with about `most` cases in all."""
+    block = case_ids // (size := block_size(design, n_inputs))
+    blocks = np.unique(block)
+    return np.flatnonzero(np.isin(block, blocks[picked_rows(blocks.size, max(most // size, 1), seed)]))
 
 
 def _salib_problem(names: tuple[str, ...]) -> dict[str, Any]:

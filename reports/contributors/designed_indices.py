@@ -63,7 +63,7 @@ def further_metrics(flown: Flown) -> Iterator[str]:
 
 def _index_figure(flown: Flown, indices: DesignedIndices, shown: np.ndarray, names: Mapping[str, str]) -> FigureBlock:
     by_metric = [(names[indices.metrics[k]], _contributors(indices, int(k))) for k in shown]
-    source = f"from {used_of(indices.n_used[shown].tolist(), indices.n_tried)} blocks of the design"
+    source = f"from {used_of(indices.n_used[shown].tolist(), indices.n_tried)} blocks of the design{flown.sample_words}"
     return contributor_figure(flown, by_metric, source)
 
 
@@ -102,8 +102,13 @@ def _index_table(
     confidence = given_percent(flown.stated.confidence)
     if designed.design == "saltelli":
         note = _saltelli_note(designed, confidence)
-        return Table("Sobol’ indices of Saltelli’s blocks", columns, tuple(rows), note)
-    return Table("Elementary effects of Morris’s trajectories", columns, tuple(rows), _morris_note(confidence))
+        return Table(f"Sobol’ indices of Saltelli’s blocks{flown.sample_words}", columns, tuple(rows), note)
+    return Table(
+        f"Elementary effects of Morris’s trajectories{flown.sample_words}",
+        columns,
+        tuple(rows),
+        _morris_note(confidence),
+    )
 
 
 def _cell(value: float, reach: float, least: float) -> Cell:

@@ -4,7 +4,8 @@
 parts are read one after the other, two to four times (`mc_engine.statistics.streaming`): all answers are those of all
 cases, to the same bits as from the whole table.  The sample, which figures are drawn of, is one case drawn at random
 from each of equal stretches of the table, by the seed of the campaign: even over the case numbers, and without a
-pattern that could meet that of a design.
+pattern that could meet that of a design.  Of a design in blocks it is whole blocks, as single cases of a block say
+nothing of the inputs.
 """
 
 from collections import Counter
@@ -19,6 +20,7 @@ import pyarrow.compute as pc
 
 from mc_engine.runner.summary import metric_parts, streamed
 from mc_engine.statistics import Summary, Verdict, judge_all, summarize, was_looked_at, worst_cases
+from mc_engine.statistics.designed_indices import picked_block_rows
 from mc_engine.statistics.limits import LimitCounts
 from mc_engine.statistics.picked_cases import picked_rows
 from mc_engine.statistics.worst import Limits, WorstSoFar, limits_on
@@ -238,7 +240,13 @@ class _FirstPass:
     def _sampled_rows(self) -> np.ndarray:
         """Row numbers of the sample, int64, ascending."""
         most = max(min(MOST_SAMPLED, MOST_CELLS // len(self.run.columns), self.n_tried), 1)
-        return picked_rows(self.n_tried, most, int(self.run.manifest["campaign"].get("seed") or 0))
+        campaign = self.run.manifest["campaign"]
+        design, seed = str(campaign.get("design")), int(campaign.get("seed") or 0)
+        if design not in ("saltelli", "morris"):
+            return picked_rows(self.n_tried, most, seed)
+        case_ids = np.concatenate([np.arange(part.first, part.stop) for part in self.run.parts])
+        inputs = sum(column.role == "dispersion" for column in self.run.columns)
+        return picked_block_rows(design, case_ids, inputs, most, seed)
 
     def passes(self, metrics: Sequence[str]) -> Iterator[dict[str, np.ndarray]]:
         """The parts for `stream`; what the first pass finds is noted on its way."""

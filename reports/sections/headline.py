@@ -185,10 +185,11 @@ def warnings(flown: Flown) -> tuple[str, ...]:
     if flown.n_tried == 0:
         sentences.append("No case was flown.")
     if flown.sampled:
+        one = "one block of the design" if flown.design in ("saltelli", "morris") else "one"
         sentences.append(
             f"Requirements, statistics, percentiles, worst and failed cases are those of all "
             f"{count(flown.n_tried)} cases. Figures, convergence, contributors and regions show {count(flown.n_held)} "
-            "of them, one picked at random from each of equal stretches of the case numbers."
+            f"of them, {one} picked at random from each of equal stretches of the case numbers."
         )
     judged = dict.fromkeys(verdict.metric for verdict in flown.verdicts)
     coarse = [name for name in judged if (flown.integration_share(name) or 0.0) > MUCH]

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mc_engine.store.store import Store
+from mc_engine.store.opening import open_store
+from mc_engine.store.store import Column, Store, create_store
 
 BURN_M_S, ANGLE_RAD = 177.20997, 0.7715809
 EXHAUST_M_S = 9.80665 * 246.0
@@ -246,6 +247,18 @@ def synthetic_run(n: int = 10_000, failed: int = 12, seed: int = 1, **changes: A
     zero = {name: float(values[0]) for name, values in fly(np.zeros(1), np.zeros(1)).items()}
     nominal = {"case_id": -1, "status": "ok", "reason": "", "ve_pct": 0.0, "oe_pct": 0.0, **zero}
     return SyntheticRun(manifest(**changes), table, nominal, histories(table))
+
+
+def kept(folder: Path, manifest: dict[str, Any], table: pd.DataFrame, part: int = 7919) -> Store:
+    """A run on the disk with these cases, in parts of so many."""
+    words = {"case_id": "integer", "status": "word", "reason": "word"}
+    columns = [Column(*one, words.get(one[0], "number")) for one in COLUMNS]
+    store = create_store(folder, manifest, "", columns)
+    with store.lock():
+        for first in range(0, len(table), part):
+            rows = table.iloc[first : first + part]
+            store.append(first, len(rows), {name: rows[name].to_numpy() for name in table.columns if name != "case_id"})
+    return open_store(folder)
 
 
 def histories(table: pd.DataFrame) -> pd.DataFrame:

@@ -5,13 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_run import COLUMNS, manifest, synthetic_run
+from synthetic_run import COLUMNS, kept, manifest, synthetic_run
 
 from mc_engine.runner.summary import judgement, summaries
 from mc_engine.statistics import selection
 from mc_engine.statistics.worst import Limits
-from mc_engine.store.opening import open_store
-from mc_engine.store.store import Column, create_store
 from reports.cli import write_reports
 from reports.contents import build
 from reports.run import all_cases
@@ -21,7 +19,6 @@ from reports.sections.tables import range_table
 
 CASES, PART, FEW_CASES = 100_000, 7919, 4000
 BUDGET, SMALL_BUDGET = 1 << 16, 1 << 13  # cells
-WORDS = {"case_id": "integer", "status": "word", "reason": "word"}
 REQUIREMENTS = [
     ("fuel", "propellant_kg", 2.0, None, 0.9, 0.9),
     ("fuel twice", "propellant_kg", 1.9, None, 0.5, 0.95),
@@ -47,14 +44,7 @@ def kept_run(folder, n=CASES):
     ]
     record = manifest(requirements=requirements)
     record["campaign"]["cases"] = n
-    columns = [Column(*one, WORDS.get(one[0], "number")) for one in COLUMNS]
-    store = create_store(folder, record, "", columns)
-    with store.lock():
-        for first in range(0, n, PART):
-            rows = table.iloc[first : first + PART]
-            values = {name: rows[name].to_numpy() for name in table.columns if name != "case_id"}
-            store.append(first, len(rows), values)
-    return open_store(folder)
+    return kept(folder, record, table, PART)
 
 
 @pytest.fixture(scope="module")
