@@ -71,11 +71,14 @@ def _driver_blocks(
         yield (
             f"No input{', and no pair of inputs,' * bool(drivers.pairs_tested)} separates failed from passed cases "
             f"beyond chance ({counted(drivers.singles_tested, 'test')} of single inputs, "
-            f"{count(drivers.pairs_tested)} of pairs, at a false-discovery rate of {percent(FALSE_DISCOVERIES)})."
+            f"{count(drivers.pairs_tested)} of pairs, at a false-discovery rate of {percent(FALSE_DISCOVERIES)}"
+            f"{flown.sample_words})."
         )
     if drivers.undecided:
+        these = f"of {flown.held_words} fewer than {drivers.fewest}"
+        few = these if flown.sampled else f"fewer than {drivers.fewest} cases"
         yield (
-            f"Not tested for contributors to failures, fewer than {drivers.fewest} cases failed or fewer than "
+            f"Not tested for contributors to failures, {few} failed or fewer than "
             f"{drivers.fewest} passed: {', '.join(drivers.undecided)}."
         )
     if flown.design == "sobol" and drivers.singles_tested and len(inputs) > 1:
@@ -110,7 +113,7 @@ def _driver_table(flown: Flown, drivers: Drivers, failed: Mapping[str, np.ndarra
         note += f" In some cases {flown.listed(lacking)} have no number: each is tested in the others, and in no pair."
     if left_out:
         note += f" {count(left_out)} weaker ones are not shown."
-    return Table("What separates failed cases from passed ones", columns, rows, note)
+    return Table(f"What separates failed cases from passed ones{flown.sample_words}", columns, rows, note)
 
 
 def _driver_row(flown: Flown, driver: Driver, failed: Mapping[str, np.ndarray]) -> tuple[Cell, ...]:
@@ -137,7 +140,7 @@ def _success_figure(
             label, overall = flown.axis(driver.inputs[0]), float(passed.mean())
             panels.append(success_panel(driver.requirement, label, curve, overall, flown.stated.confidence))
     return FigureBlock(
-        f"Success probability along the inputs that separate failed from passed cases, {count(flown.n_held)} cases.",
+        f"Success probability along the inputs that separate failed from passed cases, {flown.held_words}.",
         Drawing("Success probability in bins of single inputs", tuple(panels)),
         "half",
     )

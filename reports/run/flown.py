@@ -21,7 +21,7 @@ from mc_engine.store.store import Store
 from reports.run.all_cases import all_cases, without_attributes
 from reports.run.contributions import Contributions
 from reports.run.contributions import contributions as contributions_of
-from reports.text.numbers import axis_label, count, named, same_lengths, words
+from reports.text.numbers import axis_label, count, counted, named, same_lengths, words
 
 URGENCY = ("fail", "not demonstrable", "pass")  # of verdicts, the first to be looked at first
 NEGLIGIBLE = 1e-7  # of the size of a metric
@@ -201,6 +201,11 @@ class Flown:
     def sample_words(self) -> str:
         """What a caption says of a sample, as its end; empty where all cases are held."""
         return f", from {count(self.n_held)} of {count(self.n_tried)} cases picked evenly" if self.sampled else ""
+
+    @property
+    def held_words(self) -> str:
+        """The cases at hand in a sentence: "40 000 cases", or "2 000 cases picked evenly from 40 000"."""
+        return counted(self.n_held, "case") + (f" picked evenly from {count(self.n_tried)}" if self.sampled else "")
 
     @property
     def ok(self) -> np.ndarray:

@@ -111,11 +111,11 @@ def _estimate_row(flown: Flown, name: str, run: RunningEstimate) -> tuple[Cell, 
         Cell(number(float(run.estimate[-1]), scale=sd), float(run.estimate[-1]), interval(low, high, sd)),
         Cell(reach, run.reach),
         Cell(percent(round(run.halves_p, 4)), run.halves_p),
-        _converged_cell(run),
+        _converged_cell(flown, run),
     )
 
 
-def _converged_cell(run: RunningEstimate) -> Cell:
+def _converged_cell(flown: Flown, run: RunningEstimate) -> Cell:
     if run.settled:
         return Cell("converged", tone="good")
     if run.reach is not None and run.reach <= run.close:
@@ -123,7 +123,8 @@ def _converged_cell(run: RunningEstimate) -> Cell:
             return Cell("no", small="the halves differ", tone="bad")
         return Cell("not yet", small="few extreme cases dominate", tone="open")
     wanted = f"needs about {count(_two_digits_up(run.cases_wanted))} cases" if run.cases_wanted else "needs more cases"
-    return Cell("not yet", small=wanted, tone="open")
+    has = f"; the run has {count(flown.n_tried)}" if flown.sampled else ""  # its estimates are of all of them
+    return Cell("not yet", small=f"{wanted}{has}", tone="open")
 
 
 def _two_digits_up(cases: int) -> int:

@@ -47,7 +47,8 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
     rows = thinned_rows(used, np.flatnonzero(violated.any(axis=0))[: len(used) // 2 if used.size < 4000 else 2000])
     limits = tuple(_limit_lines(flown, figure, verdicts))
     if not limits and not violated.any():
-        return f"{figure.title}: not drawn; all cases are {inside_words(flown, verdicts)}."
+        these = flown.held_words if flown.sampled else "cases"
+        return f"{figure.title}: not drawn; all {these} are {inside_words(flown, verdicts)}."
     drawing = case_scatter(
         Points(x[rows], y[rows], "", cases=flown.case_ids[rows], columns=(figure.x, figure.y)),
         member[rows],
@@ -63,7 +64,7 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
     missing = flown.n_held - used.size
     lost = f" {count(missing)} of {count(flown.n_held)} cases have no values to draw." if missing else ""
     said = "" if limits else " No limit is drawn: none of them is decided by the two columns alone."
-    return FigureBlock(f"{figure.title}.{said}{lost}", drawing, "wide")
+    return FigureBlock(f"{figure.title}{flown.sample_words}.{said}{lost}", drawing, "wide")
 
 
 def _classes(

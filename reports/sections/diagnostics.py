@@ -92,8 +92,9 @@ def normal_probability_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
                 name,
             )
         )
+    which = f"{first_of(len(names), len(varying), 'key metrics')}{flown.sample_words}"
     caption = (
-        f"Normal probability plots of the {first_of(len(names), len(varying), 'key metrics')}. A normal distribution "
+        f"Normal probability plots of the {which}. A normal distribution "
         "lies on the dashed line; cases outside the band are beyond chance at their rank. γ₁: skewness, γ₂: excess "
         "kurtosis, both 0 of a normal distribution. Extrapolation by σ holds only where the points follow the line."
     )

@@ -87,7 +87,7 @@ def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
     drawing = outcome_scatter(flown, figure.x, figure.y, regions)
     impossible = bool(regions) and not any(region.name == "ellipse" for region in regions)
     left_out = ". No normal ellipse is shown: it would leave the physical range of these metrics" if impossible else ""
-    return FigureBlock(f"{figure.title}{left_out}.", drawing, "wide")
+    return FigureBlock(f"{figure.title}{flown.sample_words}{left_out}.", drawing, "wide")
 
 
 def outcome_scatter(flown: Flown, x_name: str, y_name: str, regions: Sequence[Line] = ()) -> Drawing:
@@ -161,7 +161,8 @@ def _distribution_figures(flown: Flown, names: list[str], title: str, height: fl
         plots = [_distribution_plot(flown, name, height) for name in group]
         part = f" ({page + 1} of {pages})" if pages > 1 else ""
         used = f"{counted(flown.n_tried, 'case')}, fewer where a panel says so."
-        yield FigureBlock(f"{title}{part}, {used}", histograms(plots), "small")
+        bars = f" Bars: {flown.held_words}." if flown.sampled else ""
+        yield FigureBlock(f"{title}{part}, {used}{bars}", histograms(plots), "small")
 
 
 def _distribution_plot(flown: Flown, name: str, height: float) -> Plot:

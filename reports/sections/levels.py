@@ -69,7 +69,12 @@ def _varies(flown: Flown, metric: str) -> bool:
 
 def _pairs_said(flown: Flown, matched: np.ndarray) -> str:
     if not len(matched):
-        return "Its levels were flown on different cases: differences between them include the scatter of the cases."
+        drawn = (
+            "In these cases its levels stand beside different inputs"
+            if flown.sampled
+            else ("Its levels were flown on different cases")
+        )
+        return f"{drawn}: differences between them include the scatter of the cases."
     share = len(matched) * matched.shape[1]
     return (
         f"{count(len(matched))} sets of cases differ in it alone, one case a level: the same draws for all "

@@ -6,9 +6,13 @@ from synthetic_run import COLUMNS, SyntheticRun, fly, kept, synthetic_run
 
 from mc_engine.sampling.designs import unit_cube
 from reports.contributors.designed_indices import designed_blocks
+from reports.contributors.sensitivity import sensitivity_blocks
 from reports.document.blocks import Table
 from reports.run import all_cases
 from reports.run.flown import Flown
+from reports.sections.convergence import convergence_blocks
+from reports.sections.corridors import corridor_blocks
+from reports.sections.figure_blocks import distribution_blocks
 from reports.text.numbers import count
 
 BLOCKS = 4000
@@ -35,3 +39,42 @@ def test_a_sample_of_a_design_in_blocks_has_whole_blocks(tmp_path, monkeypatch, 
     whole = 2000 // size
     assert table.rows[0][0].small.startswith(f"{whole} / {whole} ")
     assert table.caption.endswith(f", from {count(size * whole)} of {count(n)} cases picked evenly")
+
+
+@pytest.fixture
+def made():
+    """40 000 cases, with a limit on the fuel that none is beyond."""
+    made = synthetic_run(40_000, failed=0)
+    limit = {"name": "fuel", "metric": "propellant_kg", "at_most": 8.0, "at_least": None, "share": 0.99,
+             "confidence": 0.9}  # fmt: skip
+    figure = {"kind": "corridor", "title": "Corridor", "x": "ve_pct", "y": "oe_pct", "metrics": ["propellant_kg"]}
+    made.manifest.update(requirements=[limit], figures=[figure])
+    made.manifest["campaign"].update(design="mc", cases=40_000)
+    return made
+
+
+def test_few_failures_of_a_sample_are_not_those_of_all_cases(tmp_path, monkeypatch, made):
+    """Fewer than five cases failed, it said, where eight did, and bars of 2 000 cases were called those of 40 000."""
+    made.table.loc[np.arange(11, 40_000, 5003), "propellant_kg"] = 9.0
+    flown = sample(tmp_path, made, monkeypatch, 2000)
+    these = f"{count(2000)} cases picked evenly from {count(40_000)}"
+    assert flown.n_tried - flown.every.inside_all == 8
+    said = [block for block in sensitivity_blocks(flown) if isinstance(block, str)]
+    assert any(f", of {these} fewer than 5 failed or fewer than 5 passed: fuel" in one for one in said)
+    assert next(distribution_blocks(flown)).caption.endswith(f" Bars: {these}.")
+
+
+def test_cases_of_a_sample_that_are_all_inside_are_not_all_cases(tmp_path, monkeypatch, made):
+    made.table.loc[12, "propellant_kg"] = 9.0
+    flown = sample(tmp_path, made, monkeypatch, 2000)
+    assert 12 not in flown.case_ids
+    (said,) = corridor_blocks(flown)
+    these = f"{count(2000)} cases picked evenly from {count(40_000)}"
+    assert said == f"Corridor: not drawn; all {these} are inside all limits."
+
+
+def test_a_sample_that_needs_fewer_cases_than_the_run_has_says_so(tmp_path, monkeypatch, made):
+    """It needs about 660 cases, it said of a run of 40 000."""
+    flown = sample(tmp_path, made, monkeypatch, 300)
+    (table,) = [block for block in convergence_blocks(flown) if isinstance(block, Table)]
+    assert table.rows[0][-1].small == f"needs about 660 cases; the run has {count(40_000)}"
