@@ -18,8 +18,8 @@ assume independent cases, so for `lhs` and `sobol` they are conservative.
 The size of a change is the shift, or the ratio of spreads, for which the test statistic is zero.  Its interval contains
 all values that the test does not reject (Hodges & Lehmann, Ann. Math. Stat. 34 (1963), 598-611).  A difference of
 fractions has its own interval.  Intervals are not widened for the number of comparisons.  For pairs, shifts are those
-of the pairs that differ.  Of more than `MOST_CASES` numbers, or pairs that differ, that many are tested, selected
-evenly.
+of the pairs that differ.  Of more than `MOST_CASES` numbers, or pairs that differ, that many are tested for a shift,
+selected evenly.
 
 Wilcoxon, Biometrics Bull. 1 (1945), 80-83; Wilcox, Psychometrika 54 (1989), 305-315 (spread of pairs by distances);
 van der Waerden, Indag. Math. 14 (1952), 453-458; Chernoff & Savage, Ann. Math. Stat. 29 (1958), 972-994 (its power);
@@ -164,8 +164,10 @@ def metric_change(
     if max(np.ptp(a), np.ptp(b), abs(a[0] - b[0])) <= unit:  # the same constant
         same = float(in_units(float(np.median(b) - np.median(a)), exponent))
         return MetricChange(*described, Estimate(same, same, same), UNKNOWN, np.nan, np.nan)
-    a, b = _picked(a), _picked(b)
-    shift, shift_p = _shift(a, b, unit, z) if moved is None else _shift_of_pairs(_picked(moved), unit, z)
+    if moved is None:
+        shift, shift_p = _shift(_picked(a), _picked(b), unit, z)
+    else:
+        shift, shift_p = _shift_of_pairs(_picked(moved), unit, z)
     ratio, spread_p = _spread_ratio(a, b, paired, unit, z)
     if min(deviation) <= _ROUNDING * scale:
         ratio = UNKNOWN
@@ -236,12 +238,12 @@ def _spread_ratio(a: np.ndarray, b: np.ndarray, paired: bool, unit: float, z: fl
         other = np.where(np.abs(other - before) > unit, other, before)
         if np.array_equal(before, other):
             return Estimate(1.0, 1.0, 1.0), 1.0
-    mean_score = _paired_mean_score if paired else _mean_score
+    mean_score = _paired_mean_score(before, other) if paired else _mean_score(before, other)
     if min(before.mean(), other.mean()) <= unit:
-        return UNKNOWN, _p_value(mean_score(before, other))
+        return UNKNOWN, _p_value(mean_score(1.0))
 
     def score(ratio: float) -> float:
-        return mean_score(before, other * np.exp(-np.clip(ratio, -_FARTHEST, _FARTHEST)))
+        return mean_score(float(np.exp(-np.clip(ratio, -_FARTHEST, _FARTHEST))))
 
     start = float(np.log(other.mean() / before.mean()))
     logarithm, p_value = _inverted(score, start, 1.0 / sqrt(min(before.size, other.size)), z)
@@ -286,17 +288,34 @@ def _normal_scores(a: np.ndarray, b: np.ndarray) -> float:
     return float(scores[a.size :].sum()) / sqrt(variance) if variance > 0.0 else 0.0
 
 
-def _mean_score(a: np.ndarray, b: np.ndarray) -> float:
-    """The normal deviate of Student's t between the means of b and a: Brown and Forsythe's, of distances."""
+def _mean_score(a: np.ndarray, b: np.ndarray) -> Callable[[float], float]:
+    """The normal deviate of Student's t between the means of b times a factor, and a: Brown and Forsythe's, of
+    distances.  From the moments, so that all of very many numbers are used.
+    """
     freedom = a.size + b.size - 2
-    pooled = (a.var() * a.size + b.var() * b.size) / freedom * (1.0 / a.size + 1.0 / b.size)
-    return _normal_deviate(float(b.mean() - a.mean()), pooled, freedom)
+    (mean_a, mean_b), (square_a, square_b) = (a.mean(), b.mean()), (a.var() * a.size, b.var() * b.size)
+    sizes = 1.0 / a.size + 1.0 / b.size
+
+    def score(factor: float) -> float:
+        pooled = (square_a + factor * factor * square_b) / freedom * sizes
+        return _normal_deviate(float(factor * mean_b - mean_a), float(pooled), freedom)
+
+    return score
 
 
-def _paired_mean_score(a: np.ndarray, b: np.ndarray) -> float:
-    """The same of pairs: Student's t of their differences."""
-    differences = b - a
-    return _normal_deviate(float(differences.mean()), differences.var(ddof=1) / a.size, a.size - 1)
+def _paired_mean_score(a: np.ndarray, b: np.ndarray) -> Callable[[float], float]:
+    """The same of pairs: Student's t of their differences, factor (b - a) + (factor - 1) a, which is safe from
+    cancellation where few pairs differ.
+    """
+    difference, freedom = b - a, a.size - 1
+    means = np.array([difference.mean(), a.mean()])
+    products = np.cov(difference, a) / a.size
+
+    def score(factor: float) -> float:
+        weights = np.array([factor, factor - 1.0])
+        return _normal_deviate(float(weights @ means), float(weights @ products @ weights), freedom)
+
+    return score
 
 
 def _normal_deviate(difference: float, variance: float, freedom: int) -> float:

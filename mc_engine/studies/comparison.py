@@ -144,12 +144,12 @@ class Comparison:
 
     def selection_words(self, counted: Callable[[int], str]) -> str:
         """On metrics of which not all numbers are tested; empty without any.  counted : how a number is written."""
-        if all(max(change.n_used) <= MOST_CASES for change in self.moved):
+        paired = self.pairing.paired
+        tested = [change.differing or 0 if paired else max(change.n_used) for change in self.moved]
+        if max(tested, default=0) <= MOST_CASES:
             return ""
-        return (
-            f"shifts and spreads of more than {counted(MOST_CASES)} numbers (shifts in pairs: of that many pairs that "
-            "differ) are computed from that many, selected evenly"
-        )
+        what = f"{counted(MOST_CASES)} {'pairs that differ' if paired else 'numbers'}"
+        return f"shifts of more than {what} are computed from that many, selected evenly"
 
     @property
     def absent(self) -> tuple[str, ...]:

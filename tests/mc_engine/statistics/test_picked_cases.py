@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from scipy.special import ndtri
+from scipy.stats import ttest_ind, ttest_rel
 
 from mc_engine.sampling.designs import unit_cube
 from mc_engine.statistics.change_tests import MOST_CASES, metric_change
@@ -43,3 +44,19 @@ def test_the_shift_of_many_sobol_cases_is_that_of_all_of_them():
     a, b = sobol_normals(2 * MOST_CASES)
     change = metric_change("y", a + b, a + np.where(b > 0.0, b + 1.0, b), paired=False)
     assert change.shift.value == pytest.approx(0.5, abs=0.02)
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_the_spread_of_very_many_cases_is_that_of_all_of_them(paired):
+    """Of forty pairs that differ in a million, the selection has few: their change of spread was not significant."""
+    a, rng = np.random.default_rng(1).normal(size=5 * MOST_CASES), np.random.default_rng(2)
+    b = a.copy() if paired else rng.normal(size=3 * MOST_CASES)
+    few = rng.choice(b.size, 40, replace=False)
+    b[few] += 50.0 * np.sign(b[few])
+    before, after = (np.abs(values - np.median(values)) for values in (a, b))
+    test = ttest_rel(after, before) if paired else ttest_ind(after, before)
+    change = metric_change("y", a, b, paired=paired)
+    assert change.spread_p == pytest.approx(test.pvalue, rel=1e-6)
+    ratio = after.mean() / before.mean()
+    assert change.ratio.value == pytest.approx(ratio, rel=1e-9)
+    assert change.ratio.lower < ratio < change.ratio.upper
