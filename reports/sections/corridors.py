@@ -44,7 +44,8 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
     names = [verdict.name for verdict in verdicts]
     words, member = _classes(names, violated, ~flown.ok, inside_words(flown, verdicts))
     # every violation stays in the picture, as far as there is room
-    rows = thinned_rows(used, np.flatnonzero(violated.any(axis=0))[: len(used) // 2 if used.size < 4000 else 2000])
+    beyond = np.flatnonzero(placed & violated.any(axis=0))
+    rows = thinned_rows(used, thinned_rows(beyond, np.empty(0, np.int64)))
     limits = tuple(_limit_lines(flown, figure, verdicts))
     if not limits and not violated.any():
         these = flown.held_words if flown.sampled else "cases"

@@ -111,3 +111,13 @@ def test_few_failed_and_equal_cases_are_drawn_or_said(cases):
 
 def test_without_a_requirement_there_is_no_corridor():
     assert "corridor" not in [section.anchor for section in build(landing_run(60, requirements=[]), "run").sections]
+
+
+def test_violations_that_are_too_many_to_draw_are_drawn_evenly_over_the_cases():
+    """The first two thousand of them were drawn, and of a sorted table a tenth of those at its end."""
+    run = landing_run(30_000, failed=0, requirements=[{**REQUIREMENTS[0], "at_most": 8.8}, REQUIREMENTS[1]])
+    clouds = marks_of(corridor(build(run, "run")).drawing, Points)
+    (cases,) = [mark.cases for mark in clouds if mark.name == "beyond load"]
+    beyond = run.table["case_id"][(run.table["peak_load_g"] > 8.8) & ~(run.table["exits"] > 0.0)]
+    assert len(beyond) > 4000 > len(cases)
+    assert np.quantile(cases, (0.25, 0.5, 0.75)) == pytest.approx(np.quantile(beyond, (0.25, 0.5, 0.75)), rel=0.1)
