@@ -249,11 +249,12 @@ def synthetic_run(n: int = 10_000, failed: int = 12, seed: int = 1, **changes: A
     return SyntheticRun(manifest(**changes), table, nominal, histories(table))
 
 
-def kept(folder: Path, manifest: dict[str, Any], table: pd.DataFrame, part: int = 7919) -> Store:
+def kept(
+    folder: Path, manifest: dict[str, Any], table: pd.DataFrame, part: int = 7919, columns: Any = COLUMNS
+) -> Store:
     """A run on the disk with these cases, in parts of so many."""
-    words = {"case_id": "integer", "status": "word", "reason": "word"}
-    columns = [Column(*one, words.get(one[0], "number")) for one in COLUMNS]
-    store = create_store(folder, manifest, "", columns)
+    kinds = {"case_id": "integer", **dict.fromkeys(("status", "reason", "law"), "word")}
+    store = create_store(folder, manifest, "", [Column(*one, kinds.get(one[0], "number")) for one in columns])
     with store.lock():
         for first in range(0, len(table), part):
             rows = table.iloc[first : first + part]

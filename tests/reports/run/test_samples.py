@@ -1,5 +1,6 @@
 """What the pages say of a sample of a run that is too large to be held."""
 
+import landing_run
 import numpy as np
 import pytest
 from synthetic_run import COLUMNS, SyntheticRun, fly, kept, synthetic_run
@@ -7,12 +8,13 @@ from synthetic_run import COLUMNS, SyntheticRun, fly, kept, synthetic_run
 from mc_engine.sampling.designs import unit_cube
 from reports.contributors.designed_indices import designed_blocks
 from reports.contributors.sensitivity import sensitivity_blocks
-from reports.document.blocks import Table
+from reports.document.blocks import FigureBlock, Table
 from reports.run import all_cases
 from reports.run.flown import Flown
 from reports.sections.convergence import convergence_blocks
 from reports.sections.corridors import corridor_blocks
 from reports.sections.figure_blocks import distribution_blocks
+from reports.sections.levels import level_blocks
 from reports.text.numbers import count
 
 BLOCKS = 4000
@@ -78,3 +80,16 @@ def test_a_sample_that_needs_fewer_cases_than_the_run_has_says_so(tmp_path, monk
     flown = sample(tmp_path, made, monkeypatch, 300)
     (table,) = [block for block in convergence_blocks(flown) if isinstance(block, Table)]
     assert table.rows[0][-1].small == f"needs about 660 cases; the run has {count(40_000)}"
+
+
+def test_levels_of_a_sample_were_not_flown_on_different_cases(tmp_path, monkeypatch):
+    """Each set of cases that differ in the guidance law alone had lost some of its cases."""
+    run = landing_run.landing_run(20_000, laws=("near", "far"))
+    run.table = run.table.assign(case_id=np.arange(40_000))
+    monkeypatch.setattr(all_cases, "MOST_CELLS", 100 * len(landing_run.COLUMNS))
+    store = kept(
+        tmp_path / "run", run.manifest, run.table[[one[0] for one in landing_run.COLUMNS]], columns=landing_run.COLUMNS
+    )
+    captions = [block.caption for block in level_blocks(Flown(store, "run")) if isinstance(block, FigureBlock)]
+    assert len(captions) == 1
+    assert "In these cases its levels stand beside different inputs" in captions[0]
