@@ -137,7 +137,9 @@ def _has_avx512() -> bool:
 def _scaled(builder, width, args):
     x, n = args
     if width % 8 == 0 and _has_avx512():
-        return _by_eights(builder, width, _scaled_eight, x, n)
+        eights = [[shuffle(builder, v, v, range(first, first + 8)) for v in (x, n)] for first in range(0, width, 8)]
+        parts = [_scaled_eight(builder, *eight) for eight in eights]
+        return shuffle(builder, parts[0], parts[-1], range(width))
     # two factors, because 2**n alone leaves the range of doubles before the product does
     half = _intrinsic("rint")(builder, width, [builder.fmul(n, constant(width, 0.5))])
     first, second = (_two_to(builder, width, [part]) for part in (half, builder.fsub(n, half)))
@@ -150,14 +152,6 @@ def _scaled_eight(builder, x, n):
     name, kind = "llvm.x86.avx512.mask.scalef.pd.512", ir.FunctionType(llvm_type(8), kinds)
     scale = cgutils.get_or_insert_function(builder.module, kind, name)
     return builder.call(scale, [x, n, ir.Constant(x.type, ir.Undefined), every, current_rounding])
-
-
-def _by_eights(builder, width, emit, x, y):
-    """What `emit` makes of 8 or 16 lanes, of which its instruction takes eight."""
-    if width == 8:
-        return emit(builder, x, y)
-    halves = [[shuffle(builder, v, v, range(first, first + 8)) for v in (x, y)] for first in (0, 8)]
-    return shuffle(builder, *(emit(builder, *half) for half in halves), range(16))
 
 
 def _exponent(builder, width, args):

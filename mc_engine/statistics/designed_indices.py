@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from mc_engine.sampling.designs import IN_BLOCKS as IN_BLOCKS  # for readers of runs, too
 from mc_engine.sampling.designs import MORRIS_LEVELS, block_size
 from mc_engine.statistics.input_columns import input_columns
 from mc_engine.statistics.pick_freeze import whole_blocks

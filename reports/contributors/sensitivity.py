@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mc_engine.statistics.designed_indices import IN_BLOCKS
 from mc_engine.statistics.drivers import FALSE_DISCOVERIES, Driver, Drivers, failure_drivers, success_along
 from reports.contributors.companion import companion_blocks, no_contributors
 from reports.contributors.designed_indices import designed_blocks
@@ -34,7 +35,7 @@ def sensitivity_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
     inputs = flown.inputs
     if not flown.n_tried:
         return
-    if flown.design in ("saltelli", "morris"):
+    if flown.design in IN_BLOCKS:
         yield from designed_blocks(flown, inputs)
         return
     if flown.design == "one_at_a_time":

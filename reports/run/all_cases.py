@@ -20,7 +20,7 @@ import pyarrow.compute as pc
 
 from mc_engine.runner.summary import metric_parts, streamed
 from mc_engine.statistics import Summary, Verdict, judge_all, summarize, was_looked_at, worst_cases
-from mc_engine.statistics.designed_indices import picked_block_rows
+from mc_engine.statistics.designed_indices import IN_BLOCKS, picked_block_rows
 from mc_engine.statistics.limits import LimitCounts
 from mc_engine.statistics.picked_cases import picked_rows
 from mc_engine.statistics.worst import Limits, WorstSoFar, limits_on
@@ -242,7 +242,7 @@ class _FirstPass:
         most = max(min(MOST_SAMPLED, MOST_CELLS // len(self.run.columns), self.n_tried), 1)
         campaign = self.run.manifest["campaign"]
         design, seed = str(campaign.get("design")), int(campaign.get("seed") or 0)
-        if design not in ("saltelli", "morris"):
+        if design not in IN_BLOCKS:
             return picked_rows(self.n_tried, most, seed)
         case_ids = np.concatenate([np.arange(part.first, part.stop) for part in self.run.parts])
         inputs = sum(column.role == "dispersion" for column in self.run.columns)

@@ -7,6 +7,7 @@ import numpy as np
 
 from mc_engine.model.figures import MapFigure
 from mc_engine.statistics import Summary, Verdict
+from mc_engine.statistics.designed_indices import IN_BLOCKS
 from mc_engine.statistics.requirements import EXTENSIBLE
 from mc_engine.statistics.worst import Limits
 from mc_engine.status import OK, STATUS_NAME
@@ -185,7 +186,7 @@ def warnings(flown: Flown) -> tuple[str, ...]:
     if flown.n_tried == 0:
         sentences.append("No case was flown.")
     if flown.sampled:
-        one = "one block of the design" if flown.design in ("saltelli", "morris") else "one"
+        one = "one block of the design" if flown.design in IN_BLOCKS else "one"
         sentences.append(
             f"Requirements, statistics, percentiles, worst and failed cases are those of all "
             f"{count(flown.n_tried)} cases. Figures, convergence, contributors and regions show {count(flown.n_held)} "

@@ -69,11 +69,9 @@ def _varies(flown: Flown, metric: str) -> bool:
 
 def _pairs_said(flown: Flown, matched: np.ndarray) -> str:
     if not len(matched):
-        drawn = (
-            "In these cases its levels stand beside different inputs"
-            if flown.sampled
-            else ("Its levels were flown on different cases")
-        )
+        drawn = "Its levels were flown on different cases"
+        if flown.sampled:  # the cases that were not selected may share inputs
+            drawn = "In the selected cases, its levels have different other inputs"
         return f"{drawn}: differences between them include the scatter of the cases."
     share = len(matched) * matched.shape[1]
     return (

@@ -92,4 +92,4 @@ def test_levels_of_a_sample_were_not_flown_on_different_cases(tmp_path, monkeypa
     )
     captions = [block.caption for block in level_blocks(Flown(store, "run")) if isinstance(block, FigureBlock)]
     assert len(captions) == 1
-    assert "In these cases its levels stand beside different inputs" in captions[0]
+    assert "In the selected cases, its levels have different other inputs" in captions[0]
