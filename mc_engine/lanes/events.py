@@ -10,9 +10,11 @@ also end where the function turns.
 M. Dowell, P. Jarratt, "A modified regula falsi method", BIT 11 (1971) 168-174.
 """
 
+from collections import namedtuple
+
 from mc_engine.lanes import extrema
 from mc_engine.lanes.compiler import compile_callable, compile_inline
-from mc_engine.lanes.functions import any_lane, maximum, minimum, where
+from mc_engine.lanes.functions import any_lane, floor, maximum, minimum, where
 from mc_engine.lanes.history import look_shared, record_change, record_row
 from mc_engine.lanes.physics_function import physics
 from mc_engine.lanes.tuples import any_field, least, map_fields, select, spread
@@ -20,6 +22,17 @@ from mc_engine.lanes.tuples import any_field, least, map_fields, select, spread
 EVENTS_PER_STEP = 32
 _ITERATIONS = 90
 _SECANT_ITERATIONS = 40  # then bisection, which cannot stall
+
+# Part of an adaptive step that holds an event: lengths, senses and rates at both sides, which side moved last, next
+# length to look at, how often one was looked at, width at which it is closed
+Bracket = namedtuple("Bracket", "low high at_low at_high rate_low rate_high side look looks width")
+# The event that an adaptive step has passed: where one is looked for, hopes of that step (see `arm`), bracket, and the
+# instant behind the event
+Search = namedtuple("Search", "closing armed bracket beyond")
+_CLOSED = 2e-15  # of time and length: the width at which the bracket of an event is closed
+_CREST = 1e-7  # of a step: the same for a peak, which is flat and differs by the square of this
+_FEW = 3.0  # looks at an event with its width; then the width grows
+_CHORDS = 8.0  # then every other look halves the bracket, and the width stays: else it would be met far from the zero
 
 
 @physics
@@ -154,3 +167,87 @@ def _follow(f, method, t, finish, h, s, end, m, p, o, g_start, g_end, flying, re
 
 
 follow = compile_inline(_follow)
+
+
+@physics
+def _root(kind, before, after, rate_before, rate_after, direction, low, high):
+    """Length at which one sense meets zero: a cubic in the sense, with its rates at both sides, or its chord.
+
+    The middle where the sense still leaves zero, as after an event of the other direction: beside that event, rounding
+    decides on its sign.  `high` where the sense does not cross.  The sense of a peak has no rate.
+    """
+    across = crossed(before, after, direction)
+    width, span = high - low, after - before
+    u = before / where(across, -span, 1.0)
+    v = 1.0 - u
+    cubic = low + width * (u * u * (3.0 - 2.0 * u)) + u * v * span * (v / rate_before - u / rate_after)
+    usable = (kind != extrema.PEAK) & (cubic > low) & (cubic < high)
+    leaves = (kind != extrema.PEAK) & (before * rate_before > 0.0)
+    return where(across, where(usable, cubic, low + width * where(leaves, 0.5, u)), high)
+
+
+@physics
+def _near(kind, root, before, after, rate, direction, high, width):
+    """Not negative where the side that has crossed is within four widths of the zero; its sense and rate say so too."""
+    small = (kind == extrema.PEAK) | (abs(after) < 8.0 * width * abs(rate))
+    return where(crossed(before, after, direction), where(small, root + 4.0 * width - high, -1.0), 1.0)
+
+
+@physics
+def _halved_peak(kind, value, mask):
+    return where(mask & (kind == extrema.PEAK), 0.5 * value, value)
+
+
+def _narrow(kinds, signs, bracket, seen, rates, looking):
+    """(bracket after a look, where the look has crossed, where it is near enough to what it has crossed).
+
+    The next look goes a little behind the first zero that the sides tell of, so that it finds it crossed.  The sense
+    of a peak is halved at a side that stays (Illinois rule): M. Dowell, P. Jarratt, BIT 11 (1971) 168-174.
+    """
+    after = any_field(map_fields(crossed, bracket.at_low, seen, signs))
+    ahead, back = looking & (not after), looking & after
+    at_low = select(ahead, seen, map_fields(_halved_peak, kinds, bracket.at_low, back & (bracket.side > 0.0)))
+    at_high = select(back, seen, map_fields(_halved_peak, kinds, bracket.at_high, ahead & (bracket.side < 0.0)))
+    rate_low, rate_high = select(ahead, rates, bracket.rate_low), select(back, rates, bracket.rate_high)
+    side = where(back, 1.0, where(ahead, -1.0, bracket.side))
+    low, high = where(ahead, bracket.look, bracket.low), where(back, bracket.look, bracket.high)
+    # many looks: the rounding of the sense is in the way
+    width = where((bracket.looks > _FEW) & (bracket.looks < _CHORDS), 2.0, 1.0) * bracket.width
+    roots = map_fields(_root, kinds, at_low, at_high, rate_low, rate_high, signs, low, high)
+    near = least(map_fields(_near, kinds, roots, at_low, at_high, rate_high, signs, high, width)) >= 0.0
+    look = minimum(maximum(least(roots), low) + 0.5 * width, high - 0.4 * width)
+    every_other = bracket.looks - 2.0 * floor(0.5 * bracket.looks) < 0.5
+    inside = (look > low) & (look < high) & ((bracket.looks < _CHORDS) | every_other)
+    look, looks = where(inside, look, 0.5 * (low + high)), bracket.looks + 1.0
+    return Bracket(low, high, at_low, at_high, rate_low, rate_high, side, look, looks, width), back, near
+
+
+narrow = compile_inline(_narrow)
+
+
+@physics
+def _watched(armed, sense):
+    """The sense where it is armed, else a constant, which crosses nothing."""
+    return where(armed > 0.5, sense, 1.0)
+
+
+@physics
+def _fires_sharply(kind, armed, before, after, direction):
+    """Mask: something else than a peak crosses, whose time is wanted to the last digits."""
+    return (kind != extrema.PEAK) & (armed > 0.5) & crossed(before, after, direction)
+
+
+def _searched(kinds, signs, search, over, looking, hopes, trial, here, there):
+    """(search, where the event is found) after a look `there`, which is also the far side where a search begins."""
+    armed = select(over, hopes, search.armed)
+    seen = map_fields(_watched, armed, there.senses)
+    sharp = any_field(map_fields(_fires_sharply, kinds, armed, here.senses, there.senses, signs))
+    width = where(sharp, _CLOSED * (abs(here.t) + trial), maximum(_CREST * trial, _CLOSED * abs(here.t)))
+    at_start, zero = map_fields(_watched, armed, here.senses), 0.0 * trial
+    opened = Bracket(zero, trial, at_start, seen, here.rates, there.rates, zero, trial, zero, width)
+    bracket, back, near = narrow(kinds, signs, select(over, opened, search.bracket), seen, there.rates, over | looking)
+    found = (over | looking) & (near | (bracket.high - bracket.low <= bracket.width))
+    return Search(search.closing | over, armed, bracket, select(back, there, search.beyond)), found
+
+
+searched = compile_inline(_searched)
