@@ -243,7 +243,7 @@ def _searched(kinds, signs, search, over, looking, hopes, trial, here, there):
     seen = map_fields(_watched, armed, there.senses)
     sharp = any_field(map_fields(_fires_sharply, kinds, armed, here.senses, there.senses, signs))
     width = where(sharp, _CLOSED * (abs(here.t) + trial), maximum(_CREST * trial, _CLOSED * abs(here.t)))
-    at_start, zero = map_fields(_watched, armed, here.senses), 0.0 * trial
+    at_start, zero = map_fields(_watched, armed, here.senses), 0.0 * here.t
     opened = Bracket(zero, trial, at_start, seen, here.rates, there.rates, zero, trial, zero, width)
     bracket, back, near = narrow(kinds, signs, select(over, opened, search.bracket), seen, there.rates, over | looking)
     found = (over | looking) & (near | (bracket.high - bracket.low <= bracket.width))
