@@ -42,6 +42,12 @@ def percent_digits(share: float) -> str:
     return f"{(Decimal(f'{share:.{MOST_GIVEN}g}') * 100).normalize():f}"
 
 
+def chance_percent(chance: float) -> str:
+    """A probability that is neither 0 nor 1, in percent: 31.6, or < 0.1 and > 99.9 where it would round to an end."""
+    percent = f"{100.0 * chance:.1f}"
+    return {"0.0": "< 0.1", "100.0": "> 99.9"}.get(percent, percent)
+
+
 def outward(value: float, decimals: int, up: bool) -> float:
     """`value` to this number of decimals, rounded up or down, so that a printed bound claims no more than was shown."""
     scaled = Decimal(repr(float(value))).scaleb(decimals)

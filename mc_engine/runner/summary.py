@@ -301,9 +301,11 @@ def summary_lines(metric: str, summary: "Summary", unit: str, random: bool) -> l
 
     moments = f"mean {told(summary.mean)}, sd {sd}, " if random or summary.quantiles else ""
     lines = [head, f"  {moments}from {told(summary.minimum)} to {told(summary.maximum)}"]
+    shares = [percent_digits(item.probability) for item in summary.quantiles]
+    decimals = max((len(share.partition(".")[2]) for share in shares), default=0)
     for item in summary.quantiles:
         interval = f"  [{bound(item.lower, False)}, {bound(item.upper, True)}]" if random else ""
-        lines.append(f"  {100.0 * item.probability:>7.3f} %  {told(item.value)}{interval}")
+        lines.append(f"  {100.0 * item.probability:>{decimals + 4}.{decimals}f} %  {told(item.value)}{interval}")
     return lines
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.parts import Requirement
-from mc_engine.numbers_in_text import counted, outward
+from mc_engine.numbers_in_text import chance_percent, counted, outward
 from mc_engine.statistics.binomial import (
     acceptance_number,
     half_rate_share,
@@ -51,7 +51,7 @@ def table_lines(rows: Sequence[PlanRow], share: float, confidence: float) -> Ite
     for row in rows:
         anytime = smallest_at_any_time(share, confidence, row.failures)
         shown = f"{outward(row.shown, digits, up=False):.{digits}f}"
-        yield f"{row.failures:>8}  {row.cases:>9}  {anytime:>13}  {shown:>18}  {100.0 * row.half_rate:.1f} %"
+        yield f"{row.failures:>8}  {row.cases:>9}  {anytime:>13}  {shown:>18}  {chance_percent(row.half_rate)} %"
 
 
 def interval_lines(share: float, confidence: float) -> Iterator[str]:
@@ -102,7 +102,7 @@ def _allowance(cases: int, share: float, confidence: float) -> str:
     just, half = (pass_chance(cases, accepted, true_share) for true_share in (share, half_rate_share(share)))
     return (
         f"  {cases:,} cases allow {counted(accepted, 'failure')}; they pass a system that just misses the share "
-        f"with {100.0 * just:.1f} %, one that fails half as often as it may with {100.0 * half:.1f} %"
+        f"with {chance_percent(just)} %, one that fails half as often as it may with {chance_percent(half)} %"
     )
 
 

@@ -117,3 +117,10 @@ def test_a_summary_in_lines_says_how_many_cases_it_rests_on():
     assert summary_lines("fuel_kg", summarize(np.array([np.nan])), "kg", True) == [
         "fuel_kg [kg]: 0 of 1 cases have a number"
     ]
+
+
+def test_a_percentile_next_to_an_end_is_printed_with_all_its_digits():
+    summary = summarize(np.array([1.0, 2.0]), probabilities=(0.00000135, 0.5, 0.99999865))
+    lines = summary_lines("fuel_kg", summary, "kg", random=False)[2:]
+    assert [line.split()[0] for line in lines] == ["0.000135", "50.000000", "99.999865"]
+    assert len({line.index("%") for line in lines}) == 1

@@ -3,6 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom, poisson
 
+from mc_engine.numbers_in_text import chance_percent
 from mc_engine.statistics.binomial import acceptance_number, lower_bound, smallest_sample
 from mc_engine.studies.plan import plan_row, table_lines
 
@@ -48,3 +49,11 @@ def test_a_share_next_to_one_is_demonstrated_with_digits_and_chances_that_are_nu
     assert row.half_rate == pytest.approx(poisson.cdf(1, 0.5e-11 * row.cases), rel=1e-6)
     shown = float(list(table_lines([row], share, confidence))[1].split()[3])
     assert share <= shown < 1.0
+
+
+def test_a_chance_that_is_not_certain_never_reads_as_certain_or_impossible():
+    def passes(share, failures):
+        return list(table_lines([plan_row(share, 0.9, failures)], share, 0.9))[1].split(maxsplit=4)[4]
+
+    assert (passes(0.5, 200), passes(0.9973, 0)) == ("> 99.9 %", "31.6 %")
+    assert [chance_percent(chance) for chance in (1e-9, 0.0006, 0.9994, 0.99998)] == ["< 0.1", "0.1", "99.9", "> 99.9"]
