@@ -29,7 +29,7 @@ from mc_engine.shell_words import shell_word
 
 if TYPE_CHECKING:
     from mc_engine.campaign.loading import Campaign
-    from mc_engine.flight.flyer import Flyer, Process
+    from mc_engine.flight.flyer import Process
 
 
 @app.command()
@@ -69,11 +69,10 @@ def check(
     A few cases are flown in a separate process.  All results must exist and not depend on the other cases in the batch,
     every dispersion must have an effect, no metric may be a fixed number, and every event must happen.
     """
-    from mc_engine.runner.flown_campaign import copies_of
     from mc_engine.store.manifest_file import seed_remark
 
     with _flights_beside(file) if model else nullcontext() as process:
-        campaign, flyer, problems = _checked(file, process)
+        campaign, problems, remarks = _checked(file, process)
     if problems:
         heading = f"{campaign.model_reference}: {counted(len(problems), 'problem')}"
         leave(USAGE, "\n".join([heading, *(f"  {problem}" for problem in problems)]))
@@ -84,7 +83,7 @@ def check(
     )
     if alike := seed_remark(campaign.seed, campaign.upstream.rows.facts if campaign.upstream else None):
         typer.echo(f"seed {alike}")
-    for line in flyer.remarks(copies_of) if model else []:
+    for line in remarks:
         typer.echo(line)
 
 
@@ -106,20 +105,22 @@ def _flights_beside(file: str) -> "Iterator[Process]":
             process.kill()
 
 
-def _checked(file: str, process: "Process | None") -> "tuple[Campaign, Flyer, list[str]]":
-    """The campaign, what flies it, and sentences on its model; none without the process that flies a few cases."""
+def _checked(file: str, process: "Process | None") -> "tuple[Campaign, list[str], list[str]]":
+    """The campaign, errors of its model, and remarks; neither without the process that flies a few cases."""
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.flight.flyers import flyer_of
-    from mc_engine.runner.flown_campaign import refuse_undeclared_data
+    from mc_engine.runner.flown_campaign import copies_of, refuse_undeclared_data
 
     campaign = load_campaign(file)
     flyer = flyer_of(campaign)
-    problems = [] if process is None else flyer.faults()
-    if process is not None and not problems:
+    if process is None:
+        return campaign, [], []
+    problems = flyer.faults()
+    if not problems:
         refuse_undeclared_data(campaign)
         with _told_if_long(campaign):
             problems = flyer.faults_in_flight(process)
-    return campaign, flyer, problems
+    return campaign, *((problems, []) if problems else flyer.second_look(copies_of))
 
 
 _LONG = 30.0  # s

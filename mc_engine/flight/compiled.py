@@ -10,10 +10,11 @@ import numpy as np
 from mc_engine.campaign.loading import Campaign
 from mc_engine.flight import flight
 from mc_engine.flight.contract import breaches, flight_faults, refuse_breaches
-from mc_engine.flight.flyer import Columns, Copies, Flyer, Inputs, Process, never
+from mc_engine.flight.flyer import Columns, Copies, Flyer, Inputs, Process, never, refused_among_first
 from mc_engine.flight.kernel import FINER_STEPS, finer, make_kernel_folder, source_digest, usual_width
 from mc_engine.flight.lost_numbers import first_lost, may_be_lost
 from mc_engine.model.fields import AdaptiveStep
+from mc_engine.model.preparation import prepare
 from mc_engine.model.record import compiled_model
 from mc_engine.store.case_rows import RowLog
 
@@ -66,14 +67,17 @@ class CompiledFlyer(Flyer):
         make_kernel_folder()  # or what is wrong with the folder would be told as a fault of the model
         return flight_faults(self._campaign, process)
 
-    def remarks(self, copies_of: Copies) -> list[str]:
-        """That no case was flown, where the inputs come from a campaign that is flown first."""
+    def second_look(self, copies_of: Copies) -> tuple[list[str], list[str]]:
+        """No error; how many cases are refused, or that none was flown, as another campaign gives their inputs."""
         if (first := self._campaign.first) is None:
-            return []
-        return [
+            return [], refused_among_first(self._campaign, self._refusals)
+        return [], [
             f'no case was flown to check the model, as its inputs come from "{first.name}", which has yet to be flown; '
             "to check the model, fly that campaign and give the directory of its run as `from` in [inputs]"
         ]
+
+    def _refusals(self, inputs: Inputs, n: int) -> np.ndarray:
+        return prepare(self._model, inputs, n).refusals.reason
 
     def refuse_faults(self) -> None:
         refuse_breaches(self._campaign)

@@ -5,7 +5,7 @@ reasons, and time histories of some cases.  The runner, the store and all studie
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 from subprocess import Popen
@@ -13,8 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from mc_engine.campaign.cases import case_table, full_inputs
+from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import EngineError
 from mc_engine.model.record import Model
+from mc_engine.numbers_in_text import counted
 from mc_engine.status import STATUS_NAME
 from mc_engine.store.case_rows import RowLog
 
@@ -24,6 +27,7 @@ Inputs = Mapping[str, Any]
 Process = Popen[str]
 # a folder of the copies that a run keeps of the model's files, for a block; None if the model is no file
 Copies = Callable[[Any], AbstractContextManager[Path | None]]  # of a Campaign
+_FIRST = 1000  # cases whose inputs `check` looks at
 _STATUS_WORDS = np.array([STATUS_NAME[code] for code in range(len(STATUS_NAME))], dtype=object)
 
 
@@ -109,9 +113,12 @@ class Flyer(ABC):
         process : one of `mc_engine.flight.contract_flight`, which has loaded the campaign and waits to fly.
         """
 
-    def remarks(self, copies_of: Copies) -> list[str]:
-        """Lines for `check` without faults: what it left out; is a simulator deterministic, how long is a case."""
-        return []
+    def second_look(self, copies_of: Copies) -> tuple[list[str], list[str]]:
+        """Errors that only repeated flights show, and lines for `check`: what it left out, how long a case takes.
+
+        To be called where the other checks found nothing.
+        """
+        return [], []
 
     @abstractmethod
     def refuse_faults(self) -> None:
@@ -130,6 +137,16 @@ class Flyer(ABC):
     def lost_number(self, inputs: Inputs, noise: int, results: Columns, who: str) -> str:
         """Where a number of a failed flight became infinite or NaN, as a sentence; empty where that is not known."""
         return ""
+
+
+def refused_among_first(campaign: Campaign, refusals: Callable[[Inputs, int], Iterable[str]]) -> list[str]:
+    """A line if some of the first cases are refused.  refusals : the reason for each of n cases with these inputs."""
+    n = min(_FIRST, campaign.cases)
+    table = {} if campaign.first is not None else case_table(campaign, np.arange(n))
+    reasons = [reason for reason in refusals(full_inputs(campaign, table), n) if reason]
+    if not reasons:
+        return []
+    return [f"{len(reasons)} of the first {counted(n, 'case')} are refused; the first of them: {reasons[0]}"]
 
 
 def other_bits(a: Any, b: Any) -> bool:

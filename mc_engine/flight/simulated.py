@@ -15,7 +15,18 @@ from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import ModelError
 from mc_engine.flight.case_process import CaseEnded, CaseProcess, give_back, take
 from mc_engine.flight.case_worker import Order, Setup, folder_name, settle
-from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Copies, Flyer, Inputs, Process, RunStopped, never, other_bits
+from mc_engine.flight.flyer import (
+    NOMINAL_NOISE,
+    Columns,
+    Copies,
+    Flyer,
+    Inputs,
+    Process,
+    RunStopped,
+    never,
+    other_bits,
+    refused_among_first,
+)
 from mc_engine.flight.program_flight import Flown, flown
 from mc_engine.model.fields import Setting, inputs_of
 from mc_engine.model.record import Refusals
@@ -66,13 +77,13 @@ class SimulatorFlyer(Flyer):
         flight.fly()
         return flight.results
 
-    def refusals(self, columns: Columns, n: int) -> list[str]:
+    def refusals(self, inputs: Inputs, n: int) -> list[str]:
         """Why each case cannot be flown whose inputs are outside what the simulator accepts; else empty."""
         refusals = Refusals.none(n)
         for item in inputs_of(self.simulator).values():
             if isinstance(item, Setting) and (item.choices or item.date or isinstance(item.default, bool)):
                 continue
-            column = columns[item.name]
+            column = np.broadcast_to(np.asarray(inputs[item.name]), n)
             refusals.add(np.isnan(column), f"{item.name} is not a number")
             refusals.add(np.isinf(column), f"{item.name} is infinite")
             outside = f"{item.name} is outside {item.low:g} to {item.high:g} {item.unit}".rstrip()
@@ -129,8 +140,8 @@ class SimulatorFlyer(Flyer):
         columns = self.fly(full_inputs(self._campaign, table), noise)
         return [{name: column[k] for name, column in columns.items()} for k in range(len(noise))]
 
-    def remarks(self, copies_of: Copies) -> list[str]:
-        """Deterministic or not, metrics that no input moves, seconds a case, hours for the campaign here.
+    def second_look(self, copies_of: Copies) -> tuple[list[str], list[str]]:
+        """Whether it is deterministic as declared; metrics that no input moves, seconds a case, hours for the campaign.
 
         The nominal and one dispersed case are flown in two processes, which differ in what was flown before; in the
         second one from the copies, as `replay` and `extend` do.
@@ -152,25 +163,23 @@ class SimulatorFlyer(Flyer):
         if again is not self and first["status"] == STATUS_NAME[OK] != first_again["status"]:
             why = str(first_again["reason"]).replace(f"{copies}{os.sep}", "")
             return [f"from the copies of its files that a run keeps, as `replay` and `extend` fly it, the nominal case "
-                    f"ends as {first_again['status']}: {why}; name files that it reads in `data`"]  # fmt: skip
+                    f"ends as {first_again['status']}: {why}; name files that it reads in `data`"], []  # fmt: skip
         pairs = (first, first_again), (dispersed, dispersed_again)
-        differing = [name for name in self._names if any(other_bits(a[name], b[name]) for a, b in pairs)]
+        other = [name for name in self._names if any(other_bits(a[name], b[name]) for a, b in pairs)]
+        beyond = [name for name in other if any(self.differs(a[name], b[name]) for a, b in pairs)]
+        faults = self._not_as_declared(beyond)
         lines = ["deterministic: two flights of two cases, in two processes, give the same bits"]
-        if differing:
-            lines = [f"not deterministic: {', '.join(differing)} differ between two flights of a case"]
-            if self.simulator.deterministic:
-                drawn = "draw from case.rng or case.seed, and keep nothing from one case to the next"
-                lines[0] += f"; {drawn}" if self.simulator.fly else "; seed it by {seed}"
-                lines[0] += ", or `replay` finds other bits; where they differ by rounding alone, set deterministic to "
-                lines[0] += "false, and a tolerance"
+        if other:
+            lines = [f"not deterministic, as declared: {', '.join(other)} differ between two flights of a case"]
         still = [name for name in self._names if first[name] == dispersed[name]]
         moved = any(column[0] != self._campaign.nominal[name] for name, column in table.items())
         if moved and still and dispersed["status"] == first["status"] == STATUS_NAME[OK]:
             lines.append(f"the same in the nominal and in case 0: {', '.join(still)}; does an input move it?")
         if self.simulator.batch:
-            lines += self._of_a_batch()
+            faults += self._of_a_batch()
         if dispersed["status"] != STATUS_NAME[OK]:
             lines.append(f"case 0 ends as {dispersed['status']}: {dispersed['reason']}")
+        lines += refused_among_first(self._campaign, self.refusals)
         if flight.left_out:
             lines.append(f"not saved, as no declared outputs: the columns {', '.join(flight.left_out)} of the history")
         if self.simulator.outputs and not any(histories):
@@ -186,7 +195,19 @@ class SimulatorFlyer(Flyer):
             f"{seconds:.3g} s a case, {takes} for {counted(self._campaign.cases, 'case')} on "
             f"{counted(workers, 'worker')}"
         )
-        return lines
+        return faults, lines
+
+    def _not_as_declared(self, metrics: list[str]) -> list[str]:
+        """One sentence if metrics differ between two flights of a case, and may not."""
+        fix = "draw from case.rng or case.seed, and keep nothing from one case to the next"
+        if not self.simulator.fly:
+            fix = "seed it by {seed}"
+        by, rest = "", "or `replay` finds other bits; where they differ by rounding alone, set deterministic to false, "
+        rest += "and a tolerance"
+        if not self.simulator.deterministic:
+            by, rest = f" by more than the tolerance of {self.simulator.tolerance:g}", "or set a larger one"
+        who = f"{', '.join(metrics)} differ between two flights of a case{by}"
+        return [f"not deterministic: {who}; {fix}, {rest}"] if metrics else []
 
     def _of_a_batch(self) -> Iterator[str]:
         """One sentence if some cases have other results in a batch than each alone, or it fails as a whole."""

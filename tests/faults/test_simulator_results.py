@@ -5,8 +5,10 @@ import tempfile
 import time
 
 import pytest
+from typer.testing import CliRunner
 
 from mc_engine import RunInterrupted, load_campaign, replay, resume, run
+from mc_engine.command_line.commands import app
 from mc_engine.flight import program_flight
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.runner.flown_campaign import copies_of
@@ -204,9 +206,9 @@ def test_check_says_where_a_batch_has_other_results_than_its_cases_alone(tmp_pat
     file = python_campaign(tmp_path / "batch", cases=40, options="batch=True,")
     source = file.parent / "sim.py"
     source.write_text(source.read_text().replace('"fall_time_s": time,', f'"fall_time_s": {numbers},'))
-    remarks = "\n".join(flyer_of(load_campaign(file)).remarks(copies_of))
-    assert said in remarks
-    assert ("batch" in remarks) == bool(said)
+    faults, _ = flyer_of(load_campaign(file)).second_look(copies_of)
+    assert said in "\n".join(faults)
+    assert len(faults) == bool(said)
 
 
 OF_A_PROCESS = {
@@ -218,8 +220,20 @@ OF_A_PROCESS = {
 @pytest.mark.parametrize(("imports", "fault"), OF_A_PROCESS.values(), ids=OF_A_PROCESS)
 def test_check_says_where_results_depend_on_the_process_of_a_case(tmp_path, imports, fault):
     file = python_campaign(tmp_path / "ball", cases=4, fault=fault, imports=imports, options="slots=1,")
-    remarks = flyer_of(load_campaign(file)).remarks(copies_of)
-    assert remarks[0].startswith("not deterministic: fall_time_s, impact_speed_m_s differ between two flights")
+    told = CliRunner().invoke(app, ["check", str(file)])
+    assert told.exit_code == 2
+    assert "1 problem\n  not deterministic: fall_time_s, impact_speed_m_s differ between two flights" in told.output
+
+
+def test_check_accepts_differences_within_the_declared_tolerance(tmp_path):
+    imports, fault = OF_A_PROCESS["drawn once"]
+    for tolerance, expected in ((0.5, 0), (1e-9, 2)):
+        options = f"slots=1, deterministic=False, tolerance={tolerance},"
+        file = python_campaign(tmp_path / str(tolerance), cases=4, fault=fault, imports=imports, options=options)
+        told = CliRunner().invoke(app, ["check", str(file)])
+        assert told.exit_code == expected
+        words = "by more than the tolerance of 1e-09" if expected else "not deterministic, as declared: fall_time_s"
+        assert words in told.output
 
 
 @pytest.mark.parametrize("options", ["", "batch=True,"], ids=["case", "batch"])

@@ -269,10 +269,10 @@ def test_check_tells_of_files_that_fly_reads_and_a_run_keeps_no_copy_of(tmp_path
     file = python_campaign(tmp_path / "ball", fault=fault)
     (file.parent / "scale.txt").write_text("1.1")
     said = CliRunner().invoke(app, ["check", str(file)])
-    assert said.exit_code == 0
-    assert "from the copies of its files that a run keeps" in said.stdout
-    assert "ends as crashed" in said.stdout
-    assert "No such file or directory: 'scale.txt'; name files that it reads in `data`" in said.stdout
+    assert said.exit_code == 2
+    assert "from the copies of its files that a run keeps" in said.output
+    assert "ends as crashed" in said.output
+    assert "No such file or directory: 'scale.txt'; name files that it reads in `data`" in said.output
     source = file.parent / "sim.py"
     source.write_text(source.read_text().replace("    fly=fly,", '    fly=fly,\n    data=("scale.txt",),'))
     assert CliRunner().invoke(app, ["check", str(file)]).stdout.splitlines()[1].startswith("deterministic")
