@@ -30,6 +30,7 @@ from mc_engine.suggestions import hint
 
 _SAME = 1e-9  # of an input, which a CSV may round
 _NO_METRICS = ("case_id", "status", "reason")
+_NUMBERED = "; add it, with the number of each case from 0; `reset_index` of pandas makes a column of an index"
 _MOST = 20  # problems of one table
 
 
@@ -74,7 +75,11 @@ def _results(campaign: Campaign, file: Path, table: Columns, problems: list[Prob
     inputs = [dispersion.name for dispersion in campaign.dispersions]
     metrics = [metric.name for metric in campaign.model.metrics]
     needed = ["case_id", *inputs, *metrics]
-    problems += [Problem(name, f"is no column of the table{hint(name, table)}") for name in needed if name not in table]
+    problems += [
+        Problem(name, f"is no column of the table{_NUMBERED if name == 'case_id' else hint(name, table)}")
+        for name in needed
+        if name not in table
+    ]
     if problems:
         return {}, {}
     try:

@@ -256,6 +256,14 @@ def test_a_failed_case_of_elsewhere_is_a_row_with_a_status_and_other_columns_are
     assert 'a case that failed needs a row, too, with a status such as "crashed"' in said
 
 
+def test_a_table_whose_case_id_is_an_index_that_pandas_does_not_write_is_told_the_column(tmp_path, flown):
+    campaign = python_campaign(tmp_path / "ball", cases=60)
+    flown.cases().drop(columns="case_id").rename_axis("case_id").to_parquet(tmp_path / "results.parquet")
+    words = ["import", tmp_path / "results.parquet", "--campaign", campaign, "--out", tmp_path / "run"]
+    said = told(*words, status=2)
+    assert "case_id: is no column of the table; add it, with the number of each case from 0; `reset_index`" in said
+
+
 def test_a_table_without_a_number_is_not_blamed_on_the_model(tmp_path, flown):
     campaign = python_campaign(tmp_path / "ball", cases=60)
     metrics = [column.name for column in flown.columns if column.role == "metric"]
