@@ -1,7 +1,8 @@
 """Validation of a model's record before it flies: names, units, options of events, numbers of the clock."""
 
+import inspect
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from keyword import iskeyword
 from math import inf
 from typing import TYPE_CHECKING, Any
@@ -75,7 +76,20 @@ def refuse_false_simulator(simulator: "Simulator") -> None:
     """ModelError with one sentence if a simulator contradicts itself."""
     if not simulator.metrics:
         raise ModelError("`metrics` is empty; a simulator has one at least")
+    _refuse_other_arguments("fly", simulator.fly, "inputs", "cases" if simulator.batch else "case")
+    _refuse_other_arguments("start", simulator.start)
     _refuse_false_numbers(simulator)
+
+
+def _refuse_other_arguments(name: str, function: Callable[..., Any] | None, *given: str) -> None:
+    """ModelError for a function of a simulator that cannot be called with these arguments."""
+    try:
+        if function is not None:
+            inspect.signature(function).bind(*given)
+    except TypeError:
+        raise ModelError(f"the engine calls {name}({', '.join(given)}), and `{name}` takes other arguments") from None
+    except ValueError:  # of a compiled function, which may not tell
+        return
 
 
 def _refuse_false_numbers(system: "System") -> None:

@@ -38,6 +38,9 @@ WAVE = load_model("wave.py", WAVE_FOLDER)
         ({"data": [3]}, "has (3,) as its `data`; it must be a tuple, each item a text"),
         ({"figures": "map.png"}, "has 'map.png' as its `figures`; it must be a tuple, each item MapFigure or"),
         ({"settings": ("law",)}, "has ('law',) as its `settings`; it must be a tuple, each item Setting"),
+        ({"fly": lambda inputs: {}}, "the engine calls fly(inputs, case), and `fly` takes other arguments"),
+        ({"fly": lambda: {}, "batch": True}, "the engine calls fly(inputs, cases), and `fly` takes other arguments"),
+        ({"start": lambda shared: 1}, "the engine calls start(), and `start` takes other arguments"),
     ],
 )
 def test_a_simulator_whose_record_holds_something_else_is_refused(given, sentence):
