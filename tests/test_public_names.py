@@ -102,6 +102,10 @@ def _is_explained(argument, text):
         (lambda e, run: e.case_table("minimal", [0]), "campaign: 'minimal' is no Campaign"),
         (lambda e, run: e.case_table(e.load_campaign("minimal"), [0.5]), "a whole number from 0 to 1999, and 0.5 is"),
         (lambda e, run: e.case_table(e.load_campaign("minimal"), np.empty((0, 2), int)), r"1999, and \[\] is none"),
+        (
+            lambda e, run: e.case_table(e.load_campaign("minimal"), [[1], [1, 2]]),
+            r"1999, and \[\[1\], \[1, 2\]\] is none",
+        ),
         (lambda e, run: e.replay(run, 3.5), "a whole number from 0 to 7, and 3.5 is none"),
         (lambda e, run: e.replay(run, [3]), r"a whole number from 0 to 7, and \[3\] is none"),
         (lambda e, run: e.Simulator("title", ("mass_kg",), ()), r"`parameters` is \('mass_kg',\); declare it, param"),

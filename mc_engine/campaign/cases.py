@@ -58,7 +58,10 @@ def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray
 
 def _checked_ids(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
     refuse_no_campaign(campaign)
-    given = np.atleast_1d(case_ids)
+    try:
+        given = np.atleast_1d(case_ids)
+    except ValueError:  # of lists in a list
+        given = np.array([case_ids], dtype=object)
     if given.ndim > 1 or (given.size and given.dtype.kind not in "iu"):
         one: Any = next(iter(given.tolist()), [])
         message = f"a case is a whole number from 0 to {campaign.cases - 1}, and {one!r} is none"
