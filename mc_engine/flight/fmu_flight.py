@@ -29,13 +29,15 @@ class FmuFlight:
 
         self._fmu, self._home = fmu, home
         self._instance: Any = None
+        archive = io.BytesIO(fmu.content)
         try:
-            fmpy.extract(io.BytesIO(fmu.content), home)
+            fmpy.extract(archive, home)
             self._description = fmpy.read_model_description(str(home))
             self._types = {variable.name: variable.type for variable in self._description.modelVariables}
             self._instance = self._ready()
         except Exception as error:  # fmpy has errors of many kinds
-            raise ModelError(f"the FMU cannot be started: {error}") from None
+            text = str(error).replace(str(archive), "the archive")
+            raise ModelError(f"the FMU cannot be started: {text}") from None
 
     def fly(self, inputs: Mapping[str, Any], case: object) -> tuple[dict[str, float], dict[str, np.ndarray]]:
         """Metrics and history of one case.  Raises what fmpy does where the FMU reports an error."""

@@ -381,7 +381,7 @@ def _input_difference(document: Any, path: str, inputs: Mapping[str, Any]) -> st
     for name, value in inputs.items():
         if name not in used:
             return f'the program does not say that it used "{name}"'
-        if used[name] != value:
+        if used[name] != value or isinstance(used[name], bool) != isinstance(value, bool):  # True is 1 for Python
             return f"the program used {name} = {used[name]!r}, where the case has {value!r}"
     return ""
 

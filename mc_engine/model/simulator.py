@@ -5,6 +5,7 @@ A simulator declares its inputs and results as models do, and has the same attri
 """
 
 import math
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -43,6 +44,7 @@ _TUPLES: dict[str, Any] = {
     "published": tuple[Mapping[str, Any], ...],
 }
 LONGEST_S, LARGEST_MIB = 1e8, 2**30
+_LARGEST_FLOAT = int(sys.float_info.max)
 
 
 class Refuse(Exception):
@@ -228,12 +230,22 @@ def load_simulator(reference: str, beside: Path | None = None) -> Simulator:
 
 
 def numeric(given: Any) -> Any:
-    """What was given, NaN where masked; TypeError for text, truth values, dates and complex, which NumPy would take."""
+    """What was given, NaN where masked, infinite where no float64 holds it.
+
+    TypeError for text, truth values, dates and complex, which NumPy would take.
+    """
     kind = getattr(getattr(given, "dtype", None), "kind", "")
     items = np.ravel(given) if kind == "O" else given if isinstance(given, list | tuple) else [given]
     if kind in tuple("bSUmMc") or (kind in ("", "O") and any(isinstance(item, _NO_NUMBERS) for item in items)):
         raise TypeError
+    if kind in ("", "O") and any(map(_is_beyond, items)):
+        return np.reshape([math.inf if _is_beyond(item) else item for item in items], np.shape(given))
     return np.ma.filled(given.astype(np.float64), np.nan) if isinstance(given, np.ma.MaskedArray) else given
+
+
+def _is_beyond(item: Any) -> bool:
+    """Whether it is a whole number of Python, which has no largest, that no float64 holds."""
+    return isinstance(item, int) and abs(item) > _LARGEST_FLOAT
 
 
 def in_time(history: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

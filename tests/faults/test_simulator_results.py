@@ -193,6 +193,20 @@ def test_a_list_of_numpy_numbers_of_another_kind_is_no_array_of_numbers(tmp_path
     assert set(table["reason"]) == {'"fall_time_s" is no array of numbers'}
 
 
+@pytest.mark.parametrize("options", ["", "batch=True,"], ids=["case", "batch"])
+def test_a_whole_number_that_no_float_holds_is_infinite(tmp_path, options):
+    huge = "{'fall_time_s': HUGE, 'impact_speed_m_s': HUGE}".replace("HUGE", "[10**5000]" if options else "10**5000")
+    file = python_campaign(tmp_path / "huge", cases=1, fault=f"return {huge}", options=options)
+    row = run(load_campaign(file), tmp_path / "run", workers=1).row(0)
+    assert (row["status"], row["reason"]) == ("not-finite", '"fall_time_s" is infinite')
+
+
+def test_a_truth_value_is_not_the_input_one():
+    said = program_flight._input_difference({"used": {"gain": True}}, "used", {"gain": 1.0})
+    assert said == "the program used gain = True, where the case has 1.0"
+    assert program_flight._input_difference({"used": {"on": True, "gain": 1}}, "used", {"on": True, "gain": 1.0}) == ""
+
+
 IN_A_BATCH = {
     "short": ("time[: max(1, len(time) - 1)]", 'each of its cases alone does not: "fall_time_s" has the shape (3,)'),
     "sorted": ("np.sort(time)", "not independent: fall_time_s differ between a batch of 4"),

@@ -1,9 +1,11 @@
 """FMUs under a campaign file: FMI 2 and 3, co-simulation and model exchange, against the ball that Python flies."""
 
+import zipfile
+
 import numpy as np
 import pytest
 
-from mc_engine import CampaignError, load_campaign, replay, run
+from mc_engine import CampaignError, EngineError, load_campaign, replay, run
 from mc_engine.flight.fmu_flight import taken
 from tests.mc_engine.flight import ball_fmu
 from tests.mc_engine.flight.ball_fmu import fmu_campaign
@@ -150,6 +152,14 @@ def test_an_fmu_of_another_platform_is_refused_before_anything_flies(tmp_path, f
     file = fmu_campaign(tmp_path / "ball", fmi=fmi, platform="win64")
     with pytest.raises(CampaignError, match=r'simulator\.fmu: "ball\.fmu" is built for win64, and this machine is'):
         load_campaign(file)
+
+
+def test_a_wrong_path_in_an_fmu_is_told_in_words_that_are_the_same_in_every_process(tmp_path):
+    file = fmu_campaign(tmp_path / "ball")
+    with zipfile.ZipFile(file.with_name("ball.fmu"), "a") as archive:
+        archive.writestr("/etc/table.csv", "1")
+    with pytest.raises(EngineError, match=r"Illegal path /etc/table\.csv found in the archive\."):
+        run(load_campaign(file), tmp_path / "run", workers=1)
 
 
 def test_what_is_taken_of_a_history():
