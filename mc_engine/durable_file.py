@@ -254,13 +254,17 @@ def open_to_append(root: Path, name: str) -> int:
 def copy_into(root: Path, name: str, source: Path) -> None:
     """Write a copy of the regular file `source` as the file `name` of a directory, and create the folders on its path.
 
-    It is not synced.
+    It is not synced.  Long stretches of zeros, such as those of a sparse file, take no room.
     """
     make_way(root, name)
     with disk_errors(source), open(open_regular(source, os.O_RDONLY), "rb") as file:
         with _opened(root, name, _NEW) as descriptor:
             while piece := file.read(_PIECE):
-                write_all(descriptor, piece)
+                if piece == bytes(len(piece)):
+                    os.lseek(descriptor, len(piece), os.SEEK_CUR)
+                else:
+                    write_all(descriptor, piece)
+            os.ftruncate(descriptor, os.lseek(descriptor, 0, os.SEEK_CUR))
 
 
 def remove_if_empty(folder: Path) -> None:

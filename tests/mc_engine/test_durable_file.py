@@ -4,7 +4,7 @@ import sys
 import pytest
 
 from mc_engine import durable_file
-from mc_engine.durable_file import read_file, read_inside, write_durably
+from mc_engine.durable_file import copy_into, read_file, read_inside, write_durably
 from mc_engine.errors import DiskError, StoreError
 
 links = pytest.mark.skipif(sys.platform == "win32", reason="links need rights")
@@ -59,3 +59,14 @@ def test_a_file_that_cannot_be_written_leaves_the_one_before_and_nothing_beside_
         with pytest.raises(DiskError, match=r"a: No space left"):
             write_durably(tmp_path / "a", b"after")
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("a", b"before")]
+
+
+def test_a_copy_of_a_sparse_file_takes_no_more_room_than_the_file(tmp_path):
+    with (tmp_path / "sparse").open("wb") as file:
+        file.write(b"first")
+        file.seek(2**26)
+        file.write(b"last")
+        file.truncate(2**27 + 1)
+    copy_into(tmp_path, "run/copy", tmp_path / "sparse")
+    assert (tmp_path / "run/copy").read_bytes() == (tmp_path / "sparse").read_bytes()
+    assert 512 * (tmp_path / "run/copy").stat().st_blocks < 2**23
