@@ -5,7 +5,7 @@ matplotlib, so that the command line starts fast.  The keys of the file are in `
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
@@ -80,6 +80,7 @@ class Campaign:
     first : Campaign or None, the campaign of that run, if it has yet to be flown
     looks : tuple of int, numbers of cases at which `run --until verdict` makes interim analyses; empty for other runs
     messages : tuple of str, files of orbit messages from which covariances were read
+    files : dict, path to SHA-256, the tables and orbit messages as they were read
     sensitivity : SensitivityDesign or None, the section [sensitivity]
     report : ReportSection, probability and confidence of the statistics in the report
 
@@ -113,6 +114,7 @@ class Campaign:
     first: "Campaign | None" = field(default=None, compare=False, repr=False)
     looks: tuple[int, ...] = ()
     messages: tuple[str, ...] = ()
+    files: Mapping[Path, str] = field(default_factory=dict, compare=False, repr=False)
     sensitivity: SensitivityDesign | None = None
     report: ReportSection = field(default_factory=ReportSection)
 
@@ -222,6 +224,11 @@ def _assemble(
     )
     if section is None or count is None or findings.problems:
         return None
+    beside = directory.resolve()
+    tables = [beside / dispersion.spec["file"] for dispersion in dispersions if dispersion.dist == "empirical"]
+    tables += [table_path] if table_path is not None else []
+    read = dict.fromkeys([*tables, *(beside / name for name in messages)])
+    files = {path: sha256(path.read_bytes()).hexdigest() for path in read}
     return Campaign(
         name=name,
         title=section.title or model.title,
@@ -238,13 +245,14 @@ def _assemble(
         correlations=correlations,
         requirements=requirements,
         retention=retention,
-        digest=_digest(document, section, directory, dispersions, table_path, upstream),
+        digest=_digest(document, section, dispersions, [files[path] for path in tables], upstream),
         table_path=table_path,
         table=table,
         tuning=tuning,
         upstream=upstream,
         first=first,
         messages=messages,
+        files=files,
         sensitivity=sensitivity,
         report=sections.report or ReportSection(),
     )
@@ -352,9 +360,8 @@ def _case_count(
 def _digest(
     document: dict[str, Any],
     section: CampaignSection,
-    directory: Path,
     dispersions: tuple[Dispersion, ...],
-    table_path: Path | None,
+    tables: Sequence[str],
     upstream: "Upstream | None",
 ) -> str:
     content = json.loads(json.dumps(document, default=str))  # TOML has dates, JSON has none
@@ -364,9 +371,8 @@ def _digest(
     content["campaign"]["seed"] = section.seed or 0  # a grid may do without one, and is resumed with 0
     order = [dispersion.name for dispersion in dispersions]
     digest = sha256(json.dumps([content, order], sort_keys=True).encode())
-    files = [directory / dispersion.spec["file"] for dispersion in dispersions if dispersion.dist == "empirical"]
-    for path in [*files, *([table_path] if table_path is not None else [])]:
-        digest.update(sha256(path.read_bytes()).digest())
+    for table in tables:
+        digest.update(bytes.fromhex(table))
     if upstream is not None:
         digest.update(upstream.rows.digest.encode())
     return digest.hexdigest()

@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -83,13 +84,9 @@ def companions_of(campaign: Campaign) -> dict[str, bytes]:
     from mc_engine.store.parts import PART_FOLDERS
 
     folders_of_a_run = (*PART_FOLDERS, SENSITIVITY, FIGURES, REPLAYS, SIMULATOR)
-    empirical = [dispersion for dispersion in campaign.dispersions if dispersion.dist == "empirical"]
-    files = {dispersion.spec["file"] for dispersion in empirical} | set(campaign.messages)
     base = campaign.directory.resolve()
-    paths = {base / file for file in files}
-    if campaign.table_path is not None:
-        paths.add(campaign.table_path)
-    contents = {**{_name_in(base, path): path.read_bytes() for path in paths}, **_files_of_model(campaign)}
+    tables = {_name_in(base, path): _as_loaded(campaign, path) for path in campaign.files}
+    contents = {**tables, **_files_of_model(campaign)}
     for name in sorted(contents):
         if name != readable(name):
             sentence = f"reads {name!a}, whose name is no text in UTF-8; give it another"
@@ -100,6 +97,15 @@ def companions_of(campaign: Campaign) -> dict[str, bytes]:
             )
             raise CampaignError(campaign.name, [Problem("campaign.model", sentence)])
     return contents if campaign.upstream is None else {**contents, COMPANION: campaign.upstream.rows.content}
+
+
+def _as_loaded(campaign: Campaign, path: Path) -> bytes:
+    """The content of a file that a campaign has read; CampaignError if it was edited or removed since."""
+    content = path.read_bytes() if path.is_file() else b""
+    if sha256(content).hexdigest() != campaign.files[path]:
+        sentence = f'"{path.name}" was edited or removed after the campaign was loaded; load the campaign again'
+        raise CampaignError(campaign.name, [Problem("", sentence)])
+    return content
 
 
 def _files_of_model(campaign: Campaign) -> dict[str, bytes]:

@@ -1,9 +1,13 @@
+from pathlib import Path
+
 import numpy as np
 import pandas
 import pytest
 from toy import HERE, load, problems
 
+from mc_engine import CampaignError, load_campaign, run
 from mc_engine.campaign.cases import case_table, dispersion_records
+from tests.mc_engine.model.mistaken_campaign import write_campaign
 
 HEAD = '[campaign]\nmodel = "toy.py"\ndesign = "{design}"\ntable = "cases.csv"\n'
 CSV = "case_id,speed_pct,control,drag,height_km\n0,1.5,off,true,10\n1,-2,clipped,false,20\n2,3,off,TRUE,30\n"
@@ -104,3 +108,15 @@ def test_the_digest_follows_the_table(folder):
     before = load("", "table", head=HEAD, directory=folder).digest
     (folder / "cases.csv").write_text(CSV.replace("1.5", "1.6"))
     assert load("", "table", head=HEAD, directory=folder).digest != before
+
+
+@pytest.mark.parametrize("change", [lambda path: path.write_text("pitch_error_deg\n2.0\n"), Path.unlink])
+def test_a_table_that_is_edited_or_removed_after_its_campaign_was_loaded_is_not_flown(tmp_path, change):
+    write_campaign(tmp_path)
+    (tmp_path / "cases.csv").write_text("pitch_error_deg\n1.0\n")
+    text = '[campaign]\nmodel = "model.py"\ndesign = "table"\ntable = "cases.csv"\n'
+    campaign = load_campaign("edited", text=text, directory=tmp_path)
+    change(tmp_path / "cases.csv")
+    with pytest.raises(CampaignError, match=r'"cases.csv" was edited or removed after the campaign was loaded; load'):
+        run(campaign, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
