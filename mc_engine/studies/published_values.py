@@ -41,6 +41,7 @@ def computed_values(path: Path, *, slow: bool = True, progress: Progress | None 
     Raises ModelError, which names the record, where an input, a metric, a unit or a function is not the campaign's.
     """
     records = [record for record in read_published(path) if slow or not record.get("slow")]
+    dispersed_cases.cache_clear()  # of files that may have been edited since
     computer = _Computer(path.parent)
     values: dict[str, Value] = {}
     for number, record in enumerate(records):

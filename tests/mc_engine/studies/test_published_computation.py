@@ -66,6 +66,14 @@ def test_a_column_is_of_the_case_with_these_inputs_and_a_statistic_of_the_first_
     assert 0.0 < no_error - values["apogee"] < 10.0
 
 
+def test_a_campaign_that_is_edited_is_computed_anew_in_the_same_process(folder):
+    path = file_with(folder, MANY_CASES)
+    before = computed_values(path)["spread of the apogee"]
+    campaign = folder / "campaign.toml"
+    campaign.write_text(campaign.read_text().replace("three_sigma = 3.0", "three_sigma = 6.0"))
+    assert computed_values(path)["spread of the apogee"] > 1.5 * before
+
+
 def test_what_is_not_the_campaigns_is_an_error_that_names_the_record(folder):
     for record, sentence in [
         (ONE_CASE.replace("apogee_altitude_km", "perigee_km"), "'apogee': perigee_km is no metric of model.py"),
