@@ -58,7 +58,7 @@ def _read_csv(path: Path) -> dict[str, np.ndarray]:
     with open_beside(path, MOST_CSV_BYTES) as binary:
         lines = io.TextIOWrapper(binary, encoding="utf-8-sig", newline="")
         try:
-            return _csv_columns(path, csv.reader(lines, strict=True))
+            return _csv_columns(path, csv.reader(lines, strict=True, skipinitialspace=True))
         except (UnicodeDecodeError, csv.Error) as error:
             raise FileFault(f'"{path.name}" is not CSV text in UTF-8: {error}') from None
 

@@ -297,7 +297,9 @@ def _document(folder: Path, name: str) -> Any:
     try:
         if name.endswith(".json"):
             return json.loads(text, object_pairs_hook=_by_name)
-        rows = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
+        rows = [
+            row for row in csv.reader(io.StringIO(text), skipinitialspace=True) if any(cell.strip() for cell in row)
+        ]
     except (ValueError, RecursionError, csv.Error) as error:
         raise ValueError(f"{name} cannot be read: {error}") from None
     if len(rows) != 2 or len(rows[0]) != len(rows[1]):
@@ -318,7 +320,7 @@ def _table(folder: Path, name: str) -> tuple[list[str], np.ndarray]:
     """(names of the columns, float64[rows, columns]) of a CSV."""
     first, _, rest = _text(folder, name).partition("\n")
     try:
-        names = [column.strip() for column in next(csv.reader([first]), [])]
+        names = [column.strip() for column in next(csv.reader([first], skipinitialspace=True), [])]
         if not rest.strip():
             return names, np.empty((0, len(names)))
         table = np.loadtxt(io.StringIO(rest), delimiter=",", ndmin=2)

@@ -48,6 +48,13 @@ def test_parquet_is_read_like_csv(folder):
         assert values.tolist() == case_table(theirs, np.arange(3))[name].tolist()
 
 
+def test_a_blank_before_a_quoted_name_or_word_is_no_part_of_it(folder):
+    spaced = CSV.replace(",", ", ").replace("speed_pct", '"speed_pct"').replace("clipped", '"clipped"')
+    (folder / "cases.csv").write_text(spaced)
+    table = case_table(load("", "table", head=HEAD, directory=folder), np.arange(3))
+    assert (table["speed_pct"][1], table["control"][1]) == (-2.0, "clipped")
+
+
 def test_a_fault_in_the_table_is_refused_with_row_and_column(folder):
     for old, new, message in [
         ("speed_pct", "sped_pct", 'the column "sped_pct" is not a parameter of toy; did you mean "speed_pct"?'),

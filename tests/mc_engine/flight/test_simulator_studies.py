@@ -156,6 +156,8 @@ def test_a_csv_may_end_its_lines_by_a_return_and_one_that_cannot_be_read_is_no_r
     """Both ended the process of the case, which was said to have crashed."""
     (tmp_path / "returns.csv").write_bytes(b"time,speed\r1.5,2\r")
     assert _document(tmp_path, "returns.csv") == {"time": "1.5", "speed": "2"}
+    (tmp_path / "blanks.csv").write_text('"time", "speed"\n1.5, "2"\n')
+    assert _document(tmp_path, "blanks.csv") == {"time": "1.5", "speed": "2"}
     (tmp_path / "twice.csv").write_text("time,speed,time\n1,2,3\n")
     assert _document(tmp_path, "twice.csv") == {"time": ["1", "3"], "speed": "2"}  # a list is no number
     (tmp_path / "long.csv").write_text(f"time\n{'1' * 200_000}\n")
