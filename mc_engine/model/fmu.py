@@ -23,6 +23,7 @@ from mc_engine.model.program import (
     add_file,
     described_simulator,
     refuse_keys,
+    refuse_names,
 )
 from mc_engine.model.simulator import Simulator
 from mc_engine.suggestions import hint
@@ -76,6 +77,7 @@ def fmu_simulator(section: SimulatorSection, directory: Path, problems: Problems
         name: _bound(f"output.{name}", name, entry, variables, problems) for name, entry in section.output.items()
     }
     interface = _interface(section, description, problems)
+    refuse_names(section, problems)
     stop, step = _times(section, description, interface, problems)
     tolerance = section.solver_tolerance or _experiment(description, "tolerance") or _SOLVER_TOLERANCE
     if problems:

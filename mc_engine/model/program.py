@@ -21,6 +21,7 @@ from pydantic import Field as Key
 from mc_engine.errors import ModelError
 from mc_engine.model.fields import Field, Parameter
 from mc_engine.model.files import FileFault, resolve_beside
+from mc_engine.model.rules import refuse_name
 from mc_engine.model.simulator import LARGEST_MIB, LONGEST_S, Simulator
 from mc_engine.model.sources import Sources
 from mc_engine.section import Section
@@ -149,6 +150,7 @@ def program_simulator(section: SimulatorSection, directory: Path, problems: Prob
     """The simulator that a campaign file describes, or None with the mistakes added to `problems` by key."""
     contents: dict[Path, bytes] = {}
     refuse_keys(section, FMU_KEYS, "of an FMU; give `fmu`, its file, or leave it out", problems)
+    refuse_names(section, problems)
     command, outside = _command(section, directory, contents, problems)
     inputs = _inputs(section, directory, contents, problems)
     for name in section.files:
@@ -222,6 +224,16 @@ def refuse_keys(section: SimulatorSection, keys: Sequence[str], why: str, proble
     tables |= {f"output.{name}.": entry for name, entry in section.output.items()}
     for place, table in tables.items():
         problems.extend((f"{place}{key}", f"is {why}") for key in keys if key in table.model_fields_set)
+
+
+def refuse_names(section: SimulatorSection, problems: Problems) -> None:
+    """Note the numbers of the table whose unit or name cannot be."""
+    for kind in ("parameter", "metric", "output"):
+        for name, entry in getattr(section, kind).items():
+            try:
+                refuse_name(_field(name, entry))
+            except ModelError as error:
+                problems.append((f"{kind}.{name}", str(error)))
 
 
 def _command(

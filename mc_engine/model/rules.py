@@ -100,7 +100,7 @@ def _refuse_false_numbers(system: "System") -> None:
         refuse_other_types(item, f'{type(item).__name__} "{item.name}"')
     _refuse_half_letters(system)
     for item in numbers:
-        _refuse_name(item)
+        refuse_name(item)
         _refuse_swapped(item)
     names, outputs = [item.name for item in (*inputs, *system.metrics)], [item.name for item in system.quantities]
     ends = [f"end_{state.name}" for state in system.states]
@@ -133,7 +133,8 @@ def _refuse_half_letters(model: "System") -> None:
         raise ModelError(f'a text has {letter!a} after "{before}", which is no character; leave it out') from None
 
 
-def _refuse_name(item: Named) -> None:
+def refuse_name(item: Named) -> None:
+    """ModelError for an unknown unit, or a name that does not end in its unit or is none in Python."""
     if item.unit not in UNITS:
         raise ModelError(f'"{item.name}" has the unit "{item.unit}"{unit_hint(item.unit)}')
     suffix = unit_suffix(item.unit)

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from mc_engine import load_campaign, open_run, open_store, run
+from mc_engine import CampaignError, load_campaign, open_run, open_store, run
 from mc_engine.command_line.commands import app
 from mc_engine.errors import ModelError, RunInterrupted
 from mc_engine.flight import case_process
@@ -130,6 +130,19 @@ def program(folder, read, how, cases=8):
         text = text.replace(f'read = "{key}"', read[name])
     file.write_text(text.replace('result = "result.json"\n', "").replace('echo = "used"\n', how))
     return file
+
+
+def test_all_wrong_units_of_a_table_are_told_at_once(tmp_path):
+    file = program_campaign(tmp_path / "ball")
+    text = file.read_text()
+    for old, new in (("mass_kg = {", 'mass_kg = { unit = "kgg",'), ("fall_time_s = {", 'fall_time_s = { unit = "m",')):
+        assert old in text
+        text = text.replace(old, new)
+    file.write_text(text)
+    with pytest.raises(CampaignError) as error:
+        load_campaign(file)
+    assert 'simulator.parameter.mass_kg: "mass_kg" has the unit "kgg"; did you mean "kg"?' in str(error.value)
+    assert 'simulator.metric.fall_time_s: "fall_time_s" has the unit "m", so that its name must' in str(error.value)
 
 
 def test_results_are_read_from_a_csv_or_by_patterns_over_stdout(tmp_path, flown):
