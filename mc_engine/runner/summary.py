@@ -247,6 +247,7 @@ def streamed(
         requirements=requirements,
         design=_design(store),
         looked=_looked(store),
+        chained=bool(store.manifest.get("upstream")),
         probabilities=QUANTILES if probabilities is None else probabilities,
         confidence=confidence,
     )

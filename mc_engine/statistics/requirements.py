@@ -19,6 +19,7 @@ It fails if one of these tests fails with the allowed error, 1 - confidence, div
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -146,6 +147,7 @@ def judge_all(
     ok: np.ndarray,
     design: str = "mc",
     looked: bool = False,
+    chained: bool = False,
 ) -> tuple[list[Verdict], Verdict | None]:
     """The verdicts on all requirements of a campaign, one by one and jointly.
 
@@ -154,6 +156,7 @@ def judge_all(
     ok : bool[n_tried], whether the case was completed
     design : str, of the campaign; only for `SAMPLING_DESIGNS` does a fraction of cases estimate a probability
     looked : bool, whether the number of cases was decided by looking at the results; see `was_looked_at`
+    chained : bool, whether the cases are those of another run, so that the run cannot be extended
 
     Returns (verdicts, joint): a list of Verdict, and the joint Verdict, or None for fewer than two requirements.
 
@@ -175,16 +178,20 @@ def judge_all(
             ordered[judged] = np.sort(judged.of(values[ok & np.isfinite(values)]))
         return float(ordered[judged][rank - 1])
 
-    return judge_counted(counts, ranked, design, looked)
+    return judge_counted(counts, ranked, design, looked, chained)
 
 
 def judge_counted(
-    counts: LimitCounts, ranked: Callable[[Judged, int], float] | None, design: str = "mc", looked: bool = False
+    counts: LimitCounts,
+    ranked: Callable[[Judged, int], float] | None,
+    design: str = "mc",
+    looked: bool = False,
+    chained: bool = False,
 ) -> tuple[list[Verdict], Verdict | None]:
     """The verdicts on the counted requirements, and the joint verdict; None for fewer than two requirements.
 
     ranked : (Judged, rank from 1) to the order statistic of the usable values; None: no demonstrated bounds.
-    looked : whether the number of cases was decided by looking at the results.  The joint verdict is also None if the
+    design, looked, chained : see `judge_all`.  The joint verdict is also None if the
     joint probability to be demonstrated is not positive.  Its confidence is the smallest of theirs.
     """
     requirements = counts.requirements
@@ -192,15 +199,15 @@ def judge_counted(
         joint_share([float(requirement["share"]) for requirement in requirements]) if len(requirements) > 1 else None
     )
     among = len(requirements) + (share is not None)
-    verdicts = [
-        _verdict(requirement, counts, k, ranked, design, looked, among) for k, requirement in enumerate(requirements)
-    ]
+    further = _further_bounds(design, looked, chained)
+    of_all = partial(_verdict, counts=counts, ranked=ranked, design=design, looked=looked, further=further, among=among)
+    verdicts = [of_all(requirement, which=k) for k, requirement in enumerate(requirements)]
     if share is None:
         return verdicts, None
     confidence = min(verdict.confidence for verdict in verdicts)
     asked = {"name": JOINT, "metric": "", "share": share, "confidence": confidence}
-    alone = _verdict(asked, counts, -1, ranked, design, looked, among)
-    return verdicts, _joined(alone, [*verdicts, alone], _bounds_of(design, looked)[1])
+    alone = of_all(asked, which=-1)
+    return verdicts, _joined(alone, [*verdicts, alone], further)
 
 
 def _joined(joint: Verdict, tests: Sequence[Verdict], further: ShareLimits) -> Verdict:
@@ -256,14 +263,15 @@ def judge(
 
 def _verdict(
     requirement: Mapping[str, Any],
-    counts: LimitCounts,
     which: int,
+    counts: LimitCounts,
     ranked: Callable[[Judged, int], float] | None,
     design: str,
     looked: bool,
+    further: ShareLimits,
     among: int,
 ) -> Verdict:
-    limits, further = _bounds_of(design, looked)
+    limits = time_uniform if looked else binomial
     share, confidence = float(requirement["share"]), float(requirement["confidence"])
     at_least, at_most = limits_of(requirement)
     tried, passed = counts.tried, counts.tried - counts.outside(which)
@@ -302,10 +310,9 @@ def _verdict(
     return _with_limits_shown(verdict, judged_by(requirement), ranked)
 
 
-def _bounds_of(design: str, looked: bool) -> tuple[ShareLimits, ShareLimits]:
-    """The bounds that judge the present cases, and those for a run of more cases: an extended one, or a new one."""
-    extended = looked or design in EXTENSIBLE
-    return (time_uniform if looked else binomial), (time_uniform if extended else binomial)
+def _further_bounds(design: str, looked: bool, chained: bool) -> ShareLimits:
+    """The bounds that judge a run of more cases: this one extended, or a new one where it cannot be extended."""
+    return time_uniform if (looked or design in EXTENSIBLE) and not chained else binomial
 
 
 _UNKNOWN: tuple[str, float | None, float | None] = (NOT_DEMONSTRABLE, None, None)

@@ -38,6 +38,7 @@ def stream(
     requirements: Sequence[Mapping[str, Any]] = (),
     design: str = "mc",
     looked: bool = False,
+    chained: bool = False,
     probabilities: tuple[float, ...] = QUANTILES,
     confidence: float = 0.90,
 ) -> Streamed:
@@ -66,7 +67,7 @@ def stream(
         wanted[column].add(rank)
         return 0.0
 
-    judge_counted(counts, asked, design, looked)
+    judge_counted(counts, asked, design, looked, chained)
     spreads = {name: Spread(tallies[name]) for name in used}
     ranked = _ranked(passes, {column: digits[column].next(ranks) for column, ranks in wanted.items()}, spreads)
     summaries = {}
@@ -79,7 +80,7 @@ def stream(
         )
         summaries[name] = summary_of(spreads[name], tuple(quantiles), confidence)
     return Streamed(
-        summaries, counts, *judge_counted(counts, lambda column, rank: ranked[column][rank], design, looked)
+        summaries, counts, *judge_counted(counts, lambda column, rank: ranked[column][rank], design, looked, chained)
     )
 
 

@@ -109,7 +109,8 @@ class HeldCases:
         """A verdict per requirement, and the one on all at once."""
         looked = was_looked_at(self.manifest, self.n_wanted, self.n_tried)
         design = str(self.manifest.get("campaign", {}).get("design", "mc"))
-        return judge_all(self.requirements, self.values, self.ok, design, looked)
+        chained = bool(self.manifest.get("upstream"))
+        return judge_all(self.requirements, self.values, self.ok, design, looked, chained)
 
     @cached_property
     def summaries(self) -> dict[str, Summary]:

@@ -7,6 +7,7 @@ import pytest
 from synthetic_run import synthetic_run
 
 from mc_engine.runner.summary import verdict_line
+from mc_engine.statistics.binomial import smallest_sample
 from mc_engine.statistics.worst import Limits
 from reports.contents import build
 from reports.formats.json_data import render_json
@@ -14,6 +15,7 @@ from reports.run.flown import Flown
 from reports.sections.headline import cost_cards, verdict_cards, warnings
 from reports.sections.requirement_tables import margin_block, requirement_table, risk_table
 from reports.sections.tables import quantile_table
+from reports.text.numbers import count
 
 FUEL = {"name": "fuel", "metric": "propellant_kg", "at_most": 2.5, "at_least": None, "share": 0.9973, "confidence": 0.9}
 FORCE = {**FUEL, "name": "force", "metric": "peak_force_n", "at_most": 1000.0}
@@ -218,10 +220,12 @@ def test_a_joint_verdict_that_waits_for_a_requirement_alone_says_so():
 
 
 @pytest.mark.parametrize("changes", [{"campaign": {**mc(400), "design": "lhs"}}, {"upstream": {"name": "deorbit"}}])
-def test_a_run_that_cannot_be_extended_needs_a_new_one(changes):
-    (card,) = verdict_cards(flown(400, requirements=[FUEL], **{"campaign": mc(400), **changes}))
-    assert "; a new run of " in card.detail
-    assert card.detail.endswith(" cases with no more failures would demonstrate it.")
+def test_a_run_that_cannot_be_extended_needs_a_new_one_with_the_cases_of_the_plan(changes):
+    built = flown(400, requirements=[FUEL], **{"campaign": mc(400), **changes})
+    (verdict,) = built.verdicts
+    cases = count(smallest_sample(FUEL["share"], FUEL["confidence"], verdict.tried - verdict.passed))
+    (card,) = verdict_cards(built)
+    assert card.detail.endswith(f"; a new run of {cases} cases with no more failures would demonstrate it.")
 
 
 def test_a_key_result_stands_beside_its_limit():
