@@ -218,6 +218,7 @@ def _failed(error: BaseException, reference: str) -> Flown:
     if isinstance(error, Refuse):
         return flown(REFUSED, text_of(error) or "refused without a reason")
     if isinstance(error, MemoryError):
+        error.__traceback__ = error.__context__ = None  # they hold what fills the memory, of which a reply needs some
         return flown(MEMORY_LIMIT, "needed more memory than the simulator may have")
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         raise error
@@ -308,8 +309,7 @@ def settle(rule: str, work: Path, name: str, status: int, keep: Path | None, inp
     """
     if keep is not None and (rule == "all" or (rule == "failed" and status != OK)):
         folder = work / name
-        streams = {file: end_of(folder / file) or end_of(work / file) for file in (STDOUT, STDERR)}
-        texts = {file: text for file, text in streams.items() if text}
+        texts = {file: text for file in (STDOUT, STDERR) if (text := end_of(folder / file) or end_of(work / file))}
         if not (folder / "case.json").exists():
             texts["case.json"] = json.dumps(dict(inputs), default=str).encode()
         keep_case(keep, name, folder, texts, None if rule == "all" else MOST_KEPT)

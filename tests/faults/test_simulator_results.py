@@ -201,6 +201,13 @@ def test_a_whole_number_that_no_float_holds_is_infinite(tmp_path, options):
     assert (row["status"], row["reason"]) == ("not-finite", '"fall_time_s" is infinite')
 
 
+def test_memory_that_is_filled_with_small_objects_ends_the_case_as_memory_limit(tmp_path):
+    fault = "texts, k = {}, 0\nwhile True:\n    texts[k] = str(k) * 10  # until not even a reply has room\n    k += 1"
+    file = python_campaign(tmp_path / "ball", cases=1, fault=fault, options="memory_limit_mib=300,")
+    row = run(load_campaign(file), tmp_path / "run", workers=1).row(0)
+    assert (row["status"], row["reason"]) == ("memory-limit", "needed more memory than the simulator may have")
+
+
 def test_a_truth_value_is_not_the_input_one():
     said = program_flight._input_difference({"used": {"gain": True}}, "used", {"gain": 1.0})
     assert said == "the program used gain = True, where the case has 1.0"
