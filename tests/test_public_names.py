@@ -101,6 +101,7 @@ def _is_explained(argument, text):
         (lambda e, run: e.tune("minimal"), "campaign: 'minimal' is no Campaign"),
         (lambda e, run: e.case_table("minimal", [0]), "campaign: 'minimal' is no Campaign"),
         (lambda e, run: e.case_table(e.load_campaign("minimal"), [0.5]), "a whole number from 0 to 1999, and 0.5 is"),
+        (lambda e, run: e.case_table(e.load_campaign("minimal"), [1, None]), "from 0 to 1999, and None is none"),
         (lambda e, run: e.case_table(e.load_campaign("minimal"), np.empty((0, 2), int)), r"1999, and \[\] is none"),
         (
             lambda e, run: e.case_table(e.load_campaign("minimal"), [[1], [1, 2]]),

@@ -63,7 +63,8 @@ def _checked_ids(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
     except ValueError:  # of lists in a list
         given = np.array([case_ids], dtype=object)
     if given.ndim > 1 or (given.size and given.dtype.kind not in "iu"):
-        one: Any = next(iter(given.tolist()), [])
+        items = given.tolist()
+        one: Any = next((item for item in items if type(item) is not int), next(iter(items), []))
         message = f"a case is a whole number from 0 to {campaign.cases - 1}, and {one!r} is none"
         raise CampaignError(campaign.name, [Problem("", message)])
     ids = given.astype(np.int64)
