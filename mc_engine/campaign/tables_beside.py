@@ -20,6 +20,7 @@ from mc_engine.numbers_in_text import is_real
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
 MOST_CSV_BYTES, MOST_CSV_CELLS = 2**28, 20_000_000
 MOST_PARQUET_BYTES, MOST_PARQUET_CELLS = 2**32, 2**28
@@ -51,7 +52,16 @@ def _read_parquet(path: Path) -> dict[str, np.ndarray]:
     except ValueError as error:
         raise FileFault(f'"{path.name}" is not a Parquet file that can be read: {error}') from None
     _check_names(path, table.column_names)
-    return {name: table[name].to_numpy(zero_copy_only=False) for name in table.column_names}
+    return {name: _cells(table[name]) for name in table.column_names}
+
+
+def _cells(column: "pa.ChunkedArray") -> np.ndarray:
+    """The cells of a column of Parquet; lists and structures as their text, which is no number."""
+    from pyarrow.types import is_nested
+
+    if is_nested(column.type):
+        return np.array([str(cell) for cell in column.to_pylist()], dtype=object)
+    return np.asarray(column.to_numpy(zero_copy_only=False))
 
 
 def _read_csv(path: Path) -> dict[str, np.ndarray]:

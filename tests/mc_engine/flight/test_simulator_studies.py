@@ -279,6 +279,20 @@ def test_a_table_whose_case_id_is_an_index_that_pandas_does_not_write_is_told_th
     assert "case_id: is no column of the table; add it, with the number of each case from 0; `reset_index`" in said
 
 
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("fall_time_s", "row 1, column \"fall_time_s\": '[1.0]' is not a number"),
+        ("status", 'row 1: "[1.0]" is no status'),
+    ],
+)
+def test_a_column_of_lists_in_a_parquet_table_is_told_with_its_row(tmp_path, flown, name, sentence):
+    campaign = python_campaign(tmp_path / "ball", cases=60)
+    flown.cases().assign(**{name: [[1.0]] * 60}).to_parquet(tmp_path / "results.parquet")
+    words = ["import", tmp_path / "results.parquet", "--campaign", campaign, "--out", tmp_path / "run"]
+    assert sentence in told(*words, status=2)
+
+
 def test_a_table_without_a_number_is_not_blamed_on_the_model(tmp_path, flown):
     campaign = python_campaign(tmp_path / "ball", cases=60)
     metrics = [column.name for column in flown.columns if column.role == "metric"]
