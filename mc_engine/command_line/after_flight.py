@@ -213,6 +213,8 @@ def export(
     store = existing_run(run_at(place))
     path = out if out is not None else store.path / f"end_states.{kind}"
     refuse_unwritable_file("--out", path)
+    if path.suffix.lower() in {".parquet", *(f".{other}" for other in EXPORT_FORMATS if other != kind)}:
+        leave(USAGE, f"--out {path}: --format {kind} writes another kind of file; let the name end in .{kind}")
     from mc_engine.studies.end_states import end_columns, write_csv
 
     names = end_columns(store) if columns is None else _named_columns(store, columns)

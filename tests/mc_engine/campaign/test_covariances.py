@@ -321,6 +321,8 @@ def _check_oem(run: Path):
 
 
 def _check_csv(run: Path):
+    for name in ("ends.parquet", "ends.oem"):
+        fails_with(2, call("export", run, "--out", run.parent / name), "--format csv writes another kind of file; let")
     assert call("export", run).exit_code == 0
     rows = list(csv.DictReader((run / "end_states.csv").read_text().splitlines()))
     table = open_store(run).cases()
