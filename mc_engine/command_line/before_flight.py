@@ -182,7 +182,7 @@ def plan(
         lines = [*plan_lines(campaign, numbers, two_sided)]
     else:
         share, confidence = _probability("--share", share), _probability("--confidence", confidence)
-        lines = [f"share {share:.14g} with confidence {confidence:.10g}", ""]
+        lines = [f"share {share:.14g} with confidence {confidence:.14g}", ""]
         lines += table_lines([plan_row(share, confidence, number) for number in numbers], share, confidence)
         lines += ["", *interval_lines(share, confidence)] if two_sided else []
     for line in lines:
@@ -193,7 +193,7 @@ def _probability(name: str, value: float | None) -> float:
     if value is None:
         leave(USAGE, f"{name} is missing; give --share and --confidence, or a campaign file")
     if not LEAST_SHARE <= value <= 1.0 - LEAST_SHARE:
-        leave(USAGE, f"{name} is {value:g}; it must be above 0 and below 1 by {LEAST_SHARE:g}, such as 0.9973")
+        leave(USAGE, f"{name} is {value:.16g}; it must be above 0 and below 1 by {LEAST_SHARE:g}, such as 0.9973")
     return value
 
 

@@ -86,7 +86,7 @@ def _requirement_block(
     names: str, share: float, confidence: float, failures: Sequence[int], cases: int, two_sided: bool
 ) -> Iterator[str]:
     yield ""
-    yield f"{names}: share {share:.14g} with confidence {confidence:.10g}"
+    yield f"{names}: share {share:.14g} with confidence {confidence:.14g}"
     yield from table_lines([plan_row(share, confidence, number) for number in failures], share, confidence)
     yield _allowance(cases, share, confidence)
     if two_sided:
@@ -113,7 +113,7 @@ def _joint_block(campaign: Campaign, failures: Sequence[int]) -> Iterator[str]:
     share = joint_share([requirement.share for requirement in asked])
     among = len(asked) + (share is not None)  # as the joint verdict shares it
     yield ""
-    yield f"every requirement: if each passes, all are met with confidence {confidence:.10g} (Berger 1982)"
+    yield f"every requirement: if each passes, all are met with confidence {confidence:.14g} (Berger 1982)"
     yield f"{'failures':>8}  {'cases':>9}  cases with the confidence shared among {among} (Bonferroni)"
     for number in failures:
         each = max(plan_row(requirement.share, requirement.confidence, number).cases for requirement in asked)

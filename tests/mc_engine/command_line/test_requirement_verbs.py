@@ -18,3 +18,9 @@ def test_until_takes_one_word_and_a_campaign_that_can_be_judged_on_the_way(here)
     (here / "cart" / "campaign.toml").write_text(CAMPAIGN.replace('"mc"', '"lhs"'))
     fails_with(2, call("run", "cart", "--until", "verdict", "--out", "a"), 'cases of "lhs" are not independent')
     assert not (here / "a").exists()
+
+
+def test_a_share_or_confidence_next_to_one_never_reads_as_one(here):
+    said = call("plan", "--share", "0.9", "--confidence", "0.999999999999", "--failures", "0")
+    assert said.stdout.startswith("share 0.9 with confidence 0.999999999999\n")
+    fails_with(2, call("plan", "--share", "0.9999999999999", "--confidence", "0.9"), "--share is 0.9999999999999; it")
