@@ -16,7 +16,8 @@ import numpy as np
 from mc_engine.sampling.designs import IN_BLOCKS as IN_BLOCKS  # for readers of runs, too
 from mc_engine.sampling.designs import MORRIS_LEVELS, block_size
 from mc_engine.statistics.input_columns import input_columns
-from mc_engine.statistics.pick_freeze import whole_blocks
+from mc_engine.statistics.moments import near_one
+from mc_engine.statistics.pick_freeze import varying_blocks, whole_blocks
 from mc_engine.statistics.picked_cases import picked_rows
 
 FEWEST_BLOCKS = 10
@@ -27,6 +28,8 @@ _SEED = 1  # of the bootstrap behind the intervals: the same cases give the same
 @dataclass(frozen=True)
 class DesignedIndices:
     """Indices by name, float64[n_inputs, n_metrics], NaN where undefined; `reach` has their half intervals.
+
+    NaN too, of Saltelli's, for a metric most of whose variance is that of fewer than 10 blocks.
 
     Saltelli: "first_order" and "total", fractions of the metric's variance.  Morris: "mu_star", "mu" and "sigma", mean
     size, mean and standard deviation of the metric's change in a step of half the levels, divided by the step as a
@@ -67,6 +70,9 @@ def designed_indices(
         n_used[k] = int(flown.sum())
         y = y[flown]
         if n_used[k] < FEWEST_BLOCKS or np.ptp(y) <= 1e-12 * np.abs(y).max():
+            continue
+        scaled = near_one(y.ravel())[0].reshape(y.shape)
+        if design == "saltelli" and varying_blocks(scaled - scaled.mean()) < FEWEST_BLOCKS:
             continue
         if design == "saltelli":
             indices = _saltelli(tuple(inputs), y, confidence)

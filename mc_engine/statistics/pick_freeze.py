@@ -29,7 +29,8 @@ import numpy as np
 
 from mc_engine.sampling.block_layout import BlockLayout
 
-FEWEST_BLOCKS = 20
+FEWEST_BLOCKS = 20  # that make up most of the variance of a metric
+MOST_VARIANCE = 0.95
 _ROUNDING = 1e-20  # variance of scaled values that are all the same
 
 
@@ -41,8 +42,8 @@ def layout_of(record: Mapping[str, Any]) -> BlockLayout:
 
 @dataclass(frozen=True)
 class PickFreeze:
-    """Indices float64[n_groups, n_metrics] with their standard errors; NaN for a metric that does not vary, or varies
-    in fewer than 20 blocks.
+    """Indices float64[n_groups, n_metrics] with their standard errors; NaN for a metric that does not vary, or most of
+    whose variance is that of fewer than 20 blocks.
 
     fall : the fraction by which the variance falls with the group at its nominal values; NaN unless that was flown.
     n_used : int64[n_metrics], blocks in which every case has a number, of n_tried.
@@ -75,7 +76,7 @@ def pick_freeze(layout: BlockLayout, case_ids: np.ndarray, metrics: Mapping[str,
         y = y[np.isfinite(y).all(axis=1)]
         n_used[k] = len(y)
         scaled = _scaled(y, y[:, : layout.n_drawn])
-        if scaled is None or _told(y[:, : layout.n_drawn]) < FEWEST_BLOCKS:
+        if scaled is None or varying_blocks(scaled[:, : layout.n_drawn]) < FEWEST_BLOCKS:
             continue
         for g, group in enumerate(layout.groups):
             by_chance = _correlation(scaled, layout.independent(group))
@@ -96,12 +97,14 @@ def whole_blocks(case_ids: np.ndarray, size: int) -> np.ndarray:
     return order[whole].reshape(-1, size)
 
 
-def _told(drawn: np.ndarray) -> int:
-    """Number of blocks float64[n_blocks, n_drawn] that tell of a variance: not all rows have the metric's usual value.
+def varying_blocks(centred: np.ndarray) -> int:
+    """Number of blocks float64[n_blocks, rows], mean 0, that make up most (`MOST_VARIANCE`) of the variance.
 
-    Of a flag that one case of a thousand has, only some blocks do; the intervals from so few hold far too seldom.
+    Of a flag that one case of a thousand has, or of a metric with rare large values, these are the few blocks with such
+    a case; the intervals from so few hold far too seldom.
     """
-    return int((drawn != np.median(drawn)).any(axis=1).sum()) if drawn.size else 0
+    largest = np.sort((centred**2).sum(axis=1))[::-1].cumsum()
+    return int(np.searchsorted(largest, MOST_VARIANCE * largest[-1])) + 1
 
 
 def _scaled(y: np.ndarray, drawn: np.ndarray) -> np.ndarray | None:

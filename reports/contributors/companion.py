@@ -9,6 +9,7 @@ import numpy as np
 
 from mc_engine.statistics.input_columns import beyond_chance
 from mc_engine.statistics.moments import number_or_none
+from mc_engine.statistics.pick_freeze import MOST_VARIANCE
 from mc_engine.statistics.sensitivity import FEWEST_CASES, FEWEST_OF_TOTALS, Sensitivity
 from reports.contributors.tornado_figure import STRONGEST, contributor_figure, name_of, strongest
 from reports.document.blocks import Cell, Column, FigureBlock, Table
@@ -39,8 +40,8 @@ def companion_blocks(flown: Flown, contributions: Contributions) -> Iterator[Fig
 def no_contributors(flown: Flown, silent: list[str], used: str = "cases") -> Iterator[str]:
     """A sentence on metrics whose contributors are not known; used : what indices rest on, cases or blocks of them."""
     if silent:
-        what = "a number other than the usual one" if used == "blocks" else "a number"
-        few = f"fewer than {FEWEST_CASES} {used} with {what}"
+        few = f"fewer than {FEWEST_CASES} {used} have a number"
+        few += f", or make up {given_percent(MOST_VARIANCE)} of its variance" if used == "blocks" else ""
         yield f"No contributors for {flown.listed(silent)}: the same in all cases that have it, or {few}."
 
 

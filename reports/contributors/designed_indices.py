@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from mc_engine.statistics.designed_indices import FEWEST_BLOCKS, DesignedIndices, designed_indices
+from mc_engine.statistics.pick_freeze import MOST_VARIANCE
 from reports.contributors.tornado_figure import contributor_figure
 from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.run.contributions import Contributor
@@ -42,9 +43,10 @@ def designed_blocks(flown: Flown, inputs: Mapping[str, Any]) -> Iterator[FigureB
     if shown.size:
         yield _index_table(flown, indices, shown, names, main)
     if silent:
+        few = f", or make up {given_percent(MOST_VARIANCE)} of its variance" if flown.design == "saltelli" else ""
         yield (
             f"No indices for {', '.join(silent)}: the same in all cases that have it, or fewer than {FEWEST_BLOCKS} "
-            f"whole {BLOCKS[flown.design]} with a number."
+            f"whole {BLOCKS[flown.design]} have a number{few}."
         )
     yield from further_metrics(flown)
     yield "Fractions of the cases of this design estimate no probabilities: its cases are not independent random draws."

@@ -75,3 +75,17 @@ def test_cases_of_an_unfinished_block_do_not_count(design):
     cases, x, y = flown(design, 40, ishigami)
     found = designed_indices(design, cases[:-1], {k: v[:-1] for k, v in x.items()}, {"y": y[:-1]})
     assert (found.n_used.tolist(), found.n_tried) == ([39], 39)
+
+
+@pytest.mark.parametrize("rest", [0.0, 0.003])
+def test_what_few_blocks_make_most_of_the_variance_of_has_no_sobol_indices(rest):
+    """Intervals of 90 % of a flag that 3 of 256 blocks have contained its first-order index in 4 of 100 trials."""
+    for limit, told in ((1.93, False), (1.6, True)):
+        cases, x, raised = flown("saltelli", 256, lambda a, b, c, limit=limit: a + b > limit, seed=5)
+        blocks = np.count_nonzero(raised.reshape(256, -1).any(axis=1))
+        assert (blocks >= 10) == told
+        assert blocks > 0
+        found = designed_indices("saltelli", cases, x, {"metric": raised + rest * x["x0"]})
+        for index in (found.values, found.reach):
+            assert np.isfinite(index["total"]).all() == np.isfinite(index["first_order"]).all() == told
+        assert found.n_used.tolist() == [256]
