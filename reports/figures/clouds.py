@@ -38,7 +38,7 @@ def case_scatter(
     cloud: Points,
     member: np.ndarray,
     classes: Sequence[tuple[str, int]],
-    axes: tuple[str, str],
+    axes: tuple[Axis, Axis],
     n_tried: int,
     *,
     lengths: bool = False,
@@ -67,5 +67,5 @@ def case_scatter(
                     size=size, opacity=opacity, key=f"{words}: {count(cases)} of {count(n_tried)} cases{thinned}")
         )  # fmt: skip
     marks = (*clouds, *outlines, *rings)
-    plot = Plot(marks, Axis(axes[0]), Axis(axes[1]), height=420.0)
+    plot = Plot(marks, *axes, height=420.0)
     return Drawing(form, (to_scale(plot) if lengths else plot,))

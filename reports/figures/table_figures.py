@@ -20,7 +20,7 @@ from mc_engine.statistics import map_metric, summarize
 from mc_engine.statistics.picked_cases import picked_rows
 from mc_engine.status import OK, STATUS_NAME
 from reports.drawing import paper
-from reports.drawing.marks import Drawing, Points
+from reports.drawing.marks import Axis, Drawing, Points
 from reports.drawing.pictures import render_picture
 from reports.figures import distributions
 from reports.figures.clouds import case_scatter
@@ -75,7 +75,7 @@ def scatter(table: pd.DataFrame, x: str, y: str) -> Picture:
     _refuse_few(used.size, 1, f"{x} and {y}")
     cloud = Points(a[used], b[used], "", cases=_case_ids(table)[used])
     classes = [("cases with both numbers", int(used.size))]
-    axes, lengths = (_label(table, x), _label(table, y)), same_lengths(_unit(table, x), _unit(table, y))
+    axes, lengths = (Axis(_label(table, x)), Axis(_label(table, y))), same_lengths(_unit(table, x), _unit(table, y))
     member = np.zeros(used.size, dtype=np.int8)
     return Picture(case_scatter(cloud, member, classes, axes, len(table), lengths=lengths))
 

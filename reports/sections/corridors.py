@@ -9,7 +9,7 @@ from mc_engine.model.figures import CorridorFigure
 from mc_engine.statistics import SurfaceMap, Verdict
 from mc_engine.statistics.maps import map_metrics
 from reports.document.blocks import FigureBlock, Table
-from reports.drawing.marks import Line, Points
+from reports.drawing.marks import Axis, Line, Points
 from reports.figures.clouds import LIMIT_SETS, case_scatter, outline
 from reports.run.flown import Flown
 from reports.run.outcomes import NOT_COMPLETED, inside, inside_words
@@ -54,7 +54,7 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
         Points(x[rows], y[rows], "", cases=flown.case_ids[rows], columns=(figure.x, figure.y)),
         member[rows],
         [(word, int(np.count_nonzero(member[used] == k))) for k, word in enumerate(words)],
-        (flown.axis(figure.x), flown.axis(figure.y)),
+        (Axis(flown.axis(figure.x)), Axis(flown.axis(figure.y))),
         flown.n_held,
         lengths=flown.lengths(figure.x, figure.y),
         styles=LIMIT_SETS,

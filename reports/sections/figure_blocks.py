@@ -5,13 +5,14 @@ from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
+import pandas as pd
 
 from mc_engine.model.figures import ScatterFigure
 from mc_engine.statistics.picked_cases import picked_rows
 from mc_engine.statistics.summary import nearly_equal
 from mc_engine.store.run_files import NOMINAL_CASE
 from reports.document.blocks import FigureBlock
-from reports.drawing.marks import Drawing, Limit, Line, Plot, Points, nominal_ring
+from reports.drawing.marks import Axis, Drawing, Limit, Line, Plot, Points, names_axis, nominal_ring
 from reports.drawing.palette import VERMILION
 from reports.figures.clouds import case_scatter
 from reports.figures.distributions import histogram, histograms
@@ -25,7 +26,7 @@ from reports.run.outcomes import case_outcomes, outcome_names
 from reports.run.phases import phase_times, phases_in_words, quantity_names
 from reports.sections.case_tables import FEW_CASES, input_words
 from reports.sections.published import published_law
-from reports.text.numbers import axis_label, count, counted, percent
+from reports.text.numbers import axis_label, count, counted, exact, percent
 
 POINTS_SHOWN = 2000
 FEWEST_SHOWN = 50  # of an outcome, as far as there are so many
@@ -101,12 +102,23 @@ def outcome_scatter(flown: Flown, x_name: str, y_name: str, regions: Sequence[Li
         Points(x[rows], y[rows], "", cases=flown.case_ids[rows], columns=(x_name, y_name)),
         outcome[rows],
         tuple(zip(outcome_names(flown), counts, strict=True)),
-        (flown.axis(x_name), flown.axis(y_name)),
+        (_column_axis(flown, x_name), _column_axis(flown, y_name)),
         flown.n_held,
         lengths=flown.lengths(x_name, y_name),
         rings=nominal_rings(flown, x_name, y_name),
         outlines=regions,
     )
+
+
+def is_switch(flown: Flown, name: str) -> bool:
+    """Whether the levels of a column are no and yes."""
+    return pd.api.types.is_bool_dtype(flown.cases[name])
+
+
+def _column_axis(flown: Flown, name: str) -> Axis:
+    """An axis of numbers, or of the two levels of a switch."""
+    label = flown.axis(name)
+    return names_axis([exact(level) for level in (False, True)], label) if is_switch(flown, name) else Axis(label)
 
 
 def distribution_blocks(flown: Flown) -> Iterator[FigureBlock | str]:

@@ -17,8 +17,8 @@ from reports.figures.histories import thinned
 from reports.run.flown import ColumnFacts, Flown
 from reports.run.outcomes import INSIDE, case_outcomes, outcome_names, outcome_sentence
 from reports.run.phases import quantity_names
-from reports.sections.figure_blocks import is_constant, outcome_scatter, thinned_rows
-from reports.text.numbers import axis_label
+from reports.sections.figure_blocks import is_constant, is_switch, outcome_scatter, thinned_rows
+from reports.text.numbers import axis_label, exact
 
 ANCHOR = "cases"
 BINS = 10
@@ -121,7 +121,9 @@ def _shown_columns(flown: Flown, most: int) -> list[ColumnFacts]:
 def _column(flown: Flown, fact: ColumnFacts, rows: np.ndarray) -> CaseColumn:
     values = flown.cases[fact.name].iloc[rows]
     label = axis_label(flown.words(fact.name), fact.unit)
-    if pd.api.types.is_bool_dtype(values) or not pd.api.types.is_numeric_dtype(values):
+    if is_switch(flown, fact.name):
+        return CaseColumn(fact.name, label, fact.role, tuple(map(exact, values.tolist())))
+    if not pd.api.types.is_numeric_dtype(values):
         return CaseColumn(fact.name, label, fact.role, tuple(values.astype(str)))
     return CaseColumn(fact.name, label, fact.role, flown.values(fact.name)[rows])
 

@@ -214,14 +214,14 @@ def _failure_figure(record: RareEventRecord) -> FigureBlock | None:
     counted = (member == 1) | (cases["level"].to_numpy() == 0)
     rows = thinned_by_outcome(np.flatnonzero(counted), member)
     x, y = (cases[item["name"]].to_numpy(dtype=np.float64) for item in shown)
-    x_label, y_label = (
-        axis_label(named(words(item["name"], item["unit"]), item["description"]), item["unit"]) for item in shown
+    x_axis, y_axis = (
+        Axis(axis_label(named(words(item["name"], item["unit"]), item["description"]), item["unit"])) for item in shown
     )
     drawing = case_scatter(
         Points(x[rows], y[rows], "", cases=rows),
         member[rows],
         [(what, int(np.count_nonzero(counted & (member == kind)))) for kind, what in enumerate(CLASSES)],
-        (x_label, y_label),
+        (x_axis, y_axis),
         len(cases),
         lengths=same_lengths(*(item["unit"] for item in shown)),
         rings=[

@@ -240,7 +240,7 @@ const reportCases = (function () {
         hovertemplate: `case %{customdata}<br>${names[0]}: %{x}<br>${names[1]}: %{y}<extra>%{fullData.name}</extra>` };
     });
     for (const axis of ["xaxis", "yaxis"]) {
-      for (const member of ["range", "type", "autorange"]) delete figure.layout[axis][member];
+      for (const member of ["range", "type", "autorange", "tickvals", "ticktext"]) delete figure.layout[axis][member];
     }
     delete figure.layout.yaxis.scaleanchor; // of two lengths, which other axes are not
     figure.layout.title.text = "";

@@ -7,7 +7,7 @@ from synthetic_run import synthetic_run
 from reports.run.flown import Flown
 from reports.run.outcomes import COMPLETED, case_outcomes, failures, inside, inside_words, outcome_sentence
 from reports.sections.case_tables import worst_tables
-from reports.sections.single_cases import case_axes
+from reports.sections.single_cases import case_axes, case_blocks, case_data
 
 
 def flown(failed, outside):
@@ -59,6 +59,19 @@ def test_the_levels_of_a_grid_that_change_no_outcome_are_no_axis_of_the_figure_b
     run.manifest["columns"].append({**run.manifest["columns"][3], "name": "idle_pct"})
     run.manifest["requirements"] = [{**run.manifest["requirements"][0], "at_most": 6.5}]
     assert case_axes(Flown(run, "run")) == ("ve_pct", "oe_pct")
+
+
+def test_a_switch_in_the_figure_by_outcome_has_its_levels_on_its_axis():
+    """It ran from 0.0 to 1.0."""
+    run = synthetic_run(80, 0)
+    run.table["oe_pct"] = run.table["case_id"] % 2 == 0
+    run.table["propellant_kg"] = 1.0 * run.table["oe_pct"] + run.table["ve_pct"] * 1e-3
+    flown = Flown(run, "run")
+    (figure,) = case_blocks(flown)
+    axes = dict(zip(case_axes(flown), (figure.drawing.plots[0].x, figure.drawing.plots[0].y), strict=True))
+    assert (axes["oe_pct"].ticks, axes["ve_pct"].ticks) == (((0, "no"), (1, "yes")), None)
+    column = next(column for column in case_data(flown, ()).columns if column.name == "oe_pct")
+    assert column.values[:2] == ("yes", "no")
 
 
 def test_failed_cases_are_listed_with_inputs_that_they_have():
