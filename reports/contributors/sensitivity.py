@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from mc_engine.statistics.designed_indices import IN_BLOCKS
-from mc_engine.statistics.drivers import FALSE_DISCOVERIES, Driver, Drivers, failure_drivers, success_along
+from mc_engine.statistics.drivers import FALSE_DISCOVERIES, MOST_ROWS, Driver, Drivers, failure_drivers, success_along
 from reports.contributors.companion import companion_blocks, no_contributors
 from reports.contributors.designed_indices import designed_blocks
 from reports.contributors.single_changes import single_change_blocks
@@ -108,6 +108,8 @@ def _driver_table(flown: Flown, drivers: Drivers, failed: Mapping[str, np.ndarra
         "that of its cell, the thirds of both inputs where most cases fail. Inputs correlated with a contributor are "
         "listed too."
     )
+    if flown.n_held > MOST_ROWS:
+        note += f" At most {count(MOST_ROWS // 2)} cases that fail and as many that pass are tested of a requirement."
     if lacking := [
         name for name, values in flown.inputs.items() if values.dtype.kind == "f" and np.isnan(values).any()
     ]:

@@ -29,7 +29,7 @@ from mc_engine.store.store import Part, Store
 
 MOST_CELLS = 1 << 24  # of a table that is held
 MOST_SAMPLED = 200_000
-MOST_SINGLE = 10  # worst cases of a metric, and failed cases
+MOST_SINGLE = 10  # worst cases of a metric
 
 
 def all_cases(run: Store, confidence: float, probabilities: tuple[float, ...]) -> "HeldCases":
@@ -139,6 +139,10 @@ class HeldCases:
         """The first cases that were not completed."""
         return self.table.iloc[np.flatnonzero(~self.ok)[:most]]
 
+    def failed_ids(self) -> np.ndarray:
+        """Numbers of the cases that were not completed, int64, ascending."""
+        return self.table["case_id"].to_numpy(dtype=np.int64)[~self.ok]
+
     def first_values(self, metric: str, most: int) -> np.ndarray:
         """float64[<= most] of the first cases."""
         return self.values(metric)[:most]
@@ -199,7 +203,10 @@ class StreamedCases(HeldCases):
         return self._cases(self._first.worst[metric, limits].case_ids[:most].tolist())
 
     def failed(self, most: int) -> pd.DataFrame:
-        return self._cases(self._first.failed[:most])
+        return self._cases(self.failed_ids()[:most].tolist())
+
+    def failed_ids(self) -> np.ndarray:
+        return np.concatenate(self._first.failed)
 
     def _cases(self, case_ids: list[int]) -> pd.DataFrame:
         for case in case_ids:
@@ -226,7 +233,7 @@ class _FirstPass:
         self.run, self.over = run, False
         self.n_tried = sum(part.rows for part in run.parts)
         self.reasons: Counter[str] = Counter()
-        self.failed: list[int] = []
+        self.failed = [np.empty(0, np.int64)]
         self.ends: dict[str, tuple[float, float]] = {}
         asked = {(name, limits_on(name, requirements)) for name in metrics}
         asked |= {
@@ -273,8 +280,7 @@ class _FirstPass:
                 self.ends[name] = (min(low, float(numbers.min())), max(high, float(numbers.max())))
         if "status" in table.column_names:  # else all were completed
             failed = table.filter(pc.not_equal(table["status"], STATUS_NAME[OK]))
-            left = MOST_SINGLE - len(self.failed)
-            self.failed += failed["case_id"].slice(0, left).to_pylist()
+            self.failed.append(failed["case_id"].to_numpy())
             for summed in pc.value_counts(failed["reason"]).to_pylist():
                 if summed["values"]:
                     self.reasons[summed["values"]] += summed["counts"]

@@ -44,7 +44,7 @@ def fair_cases(flown: Flown) -> list[int]:
     kept = sorted(case for case in flown.histories["case_id"].unique().tolist() if 0 <= case < stop and flown.random)
     if not kept:
         return []
-    known = {*kept, *flown.every.failed(kept[-1] + 1)["case_id"].tolist()}
+    known = {*kept, *flown.every.failed_ids().tolist()}
     gap = next(case for case in count() if case not in known)
     return [case for case in kept if case < gap]
 

@@ -65,7 +65,8 @@ def published_blocks(flown: Flown) -> Iterator[Table | Text | str]:
     if left:
         told = rows or len(records) < len(flown.manifest["published"])
         what = counted(left, f"{'further ' if told else ''}published value")
-        yield f"{what} of the model {'is' if left == 1 else 'are'} not computed by the cases of this run, but by:"
+        these = f"the {flown.held_words}, which alone were looked at" if flown.sampled else "the cases of this run"
+        yield f"{what} of the model {'is' if left == 1 else 'are'} not computed by {these}, but by:"
         yield Text((f"mc-engine published {flown.manifest['model']['name']} --compute",), "code")
 
 

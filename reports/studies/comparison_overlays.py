@@ -35,6 +35,8 @@ def overlay_blocks(runs: tuple[Flown, Flown], metrics: Sequence[str]) -> Iterato
         caption = "Distributions of the metrics whose numbers differ, significant changes first."
         if max(run.n_held for run in runs) > 1.0 / TAILS[0]:
             caption += f" Beyond the axes: at most {percent(TAILS[0], 1)} of the cases of each run, at either end."
+        for run, name in zip(runs, NAMES, strict=True):
+            caption += f" Outlines of {name}: {run.held_words}." if run.sampled else ""
         yield FigureBlock(caption, Drawing(FORM, panels, 3), "small")
     drawn = dict(_histories(runs))
     panels = tuple(item for item in drawn.values() if item is not None)[:MOST_PANELS]

@@ -2,6 +2,7 @@
 
 import landing_run
 import numpy as np
+import pandas as pd
 import pytest
 from synthetic_run import COLUMNS, SyntheticRun, fly, kept, synthetic_run
 
@@ -11,10 +12,12 @@ from reports.contributors.sensitivity import sensitivity_blocks
 from reports.document.blocks import FigureBlock, Table
 from reports.run import all_cases
 from reports.run.flown import Flown
+from reports.run.history_bands import fair_cases
 from reports.sections.convergence import convergence_blocks
 from reports.sections.corridors import corridor_blocks
 from reports.sections.figure_blocks import distribution_blocks
 from reports.sections.levels import level_blocks
+from reports.sections.published import published_blocks
 from reports.text.numbers import count
 
 BLOCKS = 4000
@@ -80,6 +83,30 @@ def test_a_sample_that_needs_fewer_cases_than_the_run_has_says_so(tmp_path, monk
     flown = sample(tmp_path, made, monkeypatch, 300)
     (table,) = [block for block in convergence_blocks(flown) if isinstance(block, Table)]
     assert table.rows[0][-1].small == f"needs about 660 cases; the run has {count(40_000)}"
+
+
+def test_published_values_of_cases_outside_a_sample_are_not_denied(tmp_path, monkeypatch, made):
+    """They were "not computed by the cases of this run"; case 12 of it has the number."""
+    at = {"ve_pct": float(made.table["ve_pct"][12]), "oe_pct": float(made.table["oe_pct"][12])}
+    made.manifest["published"] = [
+        {"quantity": "fuel", "published": 2.0, "unit": "kg", "column": "propellant_kg", "at": at}
+    ]
+    flown = sample(tmp_path, made, monkeypatch, 2000)
+    assert 12 not in flown.case_ids
+    said = next(block for block in published_blocks(flown) if isinstance(block, str))
+    these = f"the {count(2000)} cases picked evenly from {count(40_000)}, which alone were looked at"
+    assert said == f"1 published value of the model is not computed by {these}, but by:"
+
+
+def test_the_first_cases_of_a_large_run_are_fair_however_many_of_all_failed(tmp_path, monkeypatch, made):
+    """The eleventh failed case without a history was taken for the end of the first cases: the envelope left out 28."""
+    refused = np.arange(0, 60, 5)
+    made.table.loc[refused, "status"] = "refused"
+    flown = sample(tmp_path, made, monkeypatch, 2000)
+    saved = [case for case in range(60) if case not in refused]
+    monkeypatch.setattr(flown, "histories", pd.DataFrame({"case_id": saved}))
+    assert fair_cases(flown) == saved
+    assert flown.every.failed(3)["case_id"].tolist() == [0, 5, 10]
 
 
 def test_levels_of_a_sample_were_not_flown_on_different_cases(tmp_path, monkeypatch):

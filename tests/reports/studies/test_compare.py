@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from synthetic_run import synthetic_run
+from synthetic_run import COLUMNS, kept, synthetic_run
 
 from mc_engine.errors import StoreError
 from mc_engine.studies.comparison import compare_runs
@@ -14,7 +14,9 @@ from reports.document.blocks import FigureBlock, Table, blocks_of
 from reports.drawing.marks import Points
 from reports.drawing.ticks import axis_ticks
 from reports.formats.html import render_html
+from reports.run import all_cases
 from reports.studies.comparison import build_comparison, write_comparison
+from reports.text.numbers import count
 
 INJECTION = "<script>alert(1)</script>"
 
@@ -44,6 +46,17 @@ def test_the_headline_says_what_changed_and_the_table_by_how_much():
     assert row[3].value == pytest.approx(change.shift.value / change.deviation[0])
     (figure,) = blocks_of(document, FigureBlock)
     assert "peak force" in figure.drawing.alternative
+
+
+def test_outlines_of_selected_cases_say_so(tmp_path, monkeypatch):
+    """They looked like the distributions of all cases."""
+    runs = [synthetic_run(4000, failed=0, seed=seed) for seed in (1, 2)]
+    stores = [kept(tmp_path / name, run.manifest, run.table) for run, name in zip(runs, "ab", strict=True)]
+    monkeypatch.setattr(all_cases, "MOST_CELLS", 2000 * len(COLUMNS))
+    figures = blocks_of(build_comparison(compare_runs(*stores, ("before", "after")), tuple(stores)), FigureBlock)
+    (figure,) = [figure for figure in figures if figure.caption.startswith("Distributions")]
+    these = f"{count(2000)} cases picked evenly from {count(4000)}"
+    assert figure.caption.endswith(f" Outlines of run A: {these}. Outlines of run B: {these}.")
 
 
 def test_a_large_change_within_chance_stands_below_a_small_one_beyond_it():
