@@ -154,9 +154,8 @@ def most_failures(demonstrates: Callable[[int], bool], tried: int) -> int | None
 
 
 def _demonstrates(cases: int, share: float, confidence: float, failures: int) -> bool:
-    """True if so few failures are improbable, at most 1 - confidence, for a success probability just below `share`."""
-    # betainc(n - k, k + 1, p) is the binomial chance of at most k failures when each case succeeds with p.
-    return bool(scipy.special.betainc(cases - failures, failures + 1, share) <= 1.0 - confidence)
+    """True if the lower bound of so few failures reaches `share`: the rule by which a verdict is "pass"."""
+    return lower_bound(cases - failures, cases, confidence) >= share
 
 
 def half_rate_share(share: float) -> float:

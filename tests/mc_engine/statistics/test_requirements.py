@@ -29,6 +29,17 @@ def test_the_verdict_turns_to_pass_at_the_known_sample_sizes(failures, tried):
     assert (short.outcome, short.needed) == ("not demonstrable", tried)
 
 
+@pytest.mark.parametrize("confidence", [0.5, 0.9, 0.99])
+def test_a_verdict_its_failures_allowed_and_its_margin_agree_exactly_at_the_required_share(confidence):
+    """Of shares within a last digit of their lower bound, one in three passed with no failures allowed and no margin."""
+    for passed in range(1, 200):
+        bound = pass_probability(passed, passed, confidence)[1]
+        for share in (bound, np.nextafter(bound, 0.0), np.nextafter(bound, 1.0), (1.0 - confidence) ** (1.0 / passed)):
+            verdict = judge({**FUEL, "share": share, "confidence": confidence}, *cases(passed, 0))
+            demonstrated = verdict.outcome == "pass"
+            assert (verdict.accepted is not None, verdict.margin is not None) == (demonstrated, demonstrated)
+
+
 @pytest.mark.parametrize("design", ["mc", "sobol"])
 def test_a_run_that_is_extended_to_the_cases_needed_demonstrates_the_share(design):
     short = judge(FUEL, *cases(498, 2), design)
