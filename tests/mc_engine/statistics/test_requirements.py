@@ -31,7 +31,7 @@ def test_the_verdict_turns_to_pass_at_the_known_sample_sizes(failures, tried):
 
 @pytest.mark.parametrize("confidence", [0.5, 0.9, 0.99])
 def test_a_verdict_its_failures_allowed_and_its_margin_agree_exactly_at_the_required_share(confidence):
-    """Of shares within a last digit of their lower bound, one in three passed with no failures allowed and no margin."""
+    """Of shares within a last digit of their lower bound, one in six passed with no failures allowed and no margin."""
     for passed in range(1, 200):
         bound = pass_probability(passed, passed, confidence)[1]
         for share in (bound, np.nextafter(bound, 0.0), np.nextafter(bound, 1.0), (1.0 - confidence) ** (1.0 / passed)):
