@@ -7,6 +7,7 @@ from dataclasses import asdict
 from datetime import datetime
 from importlib.resources import as_file, files
 from typing import Any
+from unicodedata import category, east_asian_width
 
 import typst
 
@@ -16,6 +17,10 @@ from reports.document.columns import spans, unbroken, widths
 from reports.drawing import paper
 from reports.drawing.pictures import fonts
 
+NO_EAST_ASIAN = (
+    "Chinese, Japanese and Korean characters are shown as boxes: the typeface of this PDF, DejaVu Sans, has none. The "
+    "HTML report shows them."
+)
 KINDS = {Text: "text", Terms: "terms", Table: "table", FigureBlock: "figure"}
 
 
@@ -26,7 +31,12 @@ def render_pdf(document: Document) -> bytes:
 
 def typst_input(document: Document) -> str:
     """All that typst is given: its text as JSON strings, which it never reads as markup, and figures as SVG."""
-    return json.dumps(_plain_document(document), ensure_ascii=False, allow_nan=False)
+    plain = _plain_document(document)
+    content = json.dumps(plain, ensure_ascii=False, allow_nan=False)
+    if any(category(sign) == "Lo" and east_asian_width(sign) in "WF" for sign in set(content)):
+        plain["warnings"].append(NO_EAST_ASIAN)
+        content = json.dumps(plain, ensure_ascii=False, allow_nan=False)
+    return content
 
 
 def typeset(content: str) -> bytes:

@@ -17,6 +17,7 @@ from synthetic_run import synthetic_run
 from reports import build, render_pdf
 from reports.document.blocks import Cell, Column, FigureBlock, Section, Table, blocks_of
 from reports.document.columns import spans
+from reports.formats.pdf import NO_EAST_ASIAN, typst_input
 
 MARKUP = [
     '#panic("x")',
@@ -45,6 +46,14 @@ def text_of(pdf, tmp_path):
 def test_the_same_run_gives_the_same_bytes(pdf):
     assert pdf.startswith(b"%PDF")
     assert render_pdf(build(synthetic_run(3000), "run")) == pdf
+
+
+@pytest.mark.parametrize(("title", "lacking"), [("降轨", True), ("着陸", True), ("착륙", True), ("Ωé ☕ Ж", False)])
+def test_a_pdf_says_that_its_typeface_lacks_east_asian_characters(title, lacking):
+    """They were boxes without a word."""
+    run = synthetic_run(30)
+    run.manifest["campaign"]["title"] = title
+    assert (NO_EAST_ASIAN in typst_input(build(run, "run"))) == lacking
 
 
 def test_a_small_text_is_below_the_number_with_its_unit_and_neither_is_broken(pdf, tmp_path):
