@@ -16,8 +16,8 @@ import numpy as np
 from mc_engine.sampling.designs import IN_BLOCKS as IN_BLOCKS  # for readers of runs, too
 from mc_engine.sampling.designs import MORRIS_LEVELS, block_size
 from mc_engine.statistics.input_columns import input_columns
-from mc_engine.statistics.moments import near_one
-from mc_engine.statistics.pick_freeze import varying_blocks, whole_blocks
+from mc_engine.statistics.moments import near_one, varying_rows
+from mc_engine.statistics.pick_freeze import whole_blocks
 from mc_engine.statistics.picked_cases import picked_rows
 
 FEWEST_BLOCKS = 10
@@ -72,7 +72,7 @@ def designed_indices(
         if n_used[k] < FEWEST_BLOCKS or np.ptp(y) <= 1e-12 * np.abs(y).max():
             continue
         scaled = near_one(y.ravel())[0].reshape(y.shape)
-        if design == "saltelli" and varying_blocks(scaled - scaled.mean()) < FEWEST_BLOCKS:
+        if design == "saltelli" and varying_rows(scaled - scaled.mean()) < FEWEST_BLOCKS:
             continue
         if design == "saltelli":
             indices = _saltelli(tuple(inputs), y, confidence)

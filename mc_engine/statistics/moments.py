@@ -12,6 +12,7 @@ from mc_engine.statistics.normality import Normality, normality_of
 
 MANTISSA_BITS, HALF_BITS = 53, 27  # of a float64; of the lower half of its mantissa
 UNIT_BITS = 1073 + MANTISSA_BITS  # a float64 of the least exponent, -1073, is whole in units of 2**-UNIT_BITS
+MOST_VARIANCE = 0.95  # of a variance
 BLOCK = 1 << 16  # values at a time: sums of as many half mantissas are exact
 
 
@@ -39,6 +40,16 @@ def in_units(values: np.ndarray | float, exponent: np.ndarray) -> np.ndarray:
     """The inverse of `near_one`: values in their own unit again; infinite, without a warning, beyond float64."""
     with np.errstate(over="ignore"):
         return np.ldexp(values, exponent)
+
+
+def varying_rows(centred: np.ndarray) -> int:
+    """Number of rows float64[n, k], mean 0, n > 0, that make up most (`MOST_VARIANCE`) of the variance.
+
+    Of a flag that one case of a thousand has, or of a metric with rare large values, these are the few rows with such a
+    case; intervals of effects from so few hold far too seldom.
+    """
+    largest = np.sort((centred**2).sum(axis=1))[::-1].cumsum()
+    return int(np.searchsorted(largest, MOST_VARIANCE * largest[-1])) + 1
 
 
 class ExactSum:

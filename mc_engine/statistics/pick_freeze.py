@@ -28,9 +28,9 @@ from typing import Any
 import numpy as np
 
 from mc_engine.sampling.block_layout import BlockLayout
+from mc_engine.statistics.moments import varying_rows
 
 FEWEST_BLOCKS = 20  # that make up most of the variance of a metric
-MOST_VARIANCE = 0.95
 _ROUNDING = 1e-20  # variance of scaled values that are all the same
 
 
@@ -76,7 +76,7 @@ def pick_freeze(layout: BlockLayout, case_ids: np.ndarray, metrics: Mapping[str,
         y = y[np.isfinite(y).all(axis=1)]
         n_used[k] = len(y)
         scaled = _scaled(y, y[:, : layout.n_drawn])
-        if scaled is None or varying_blocks(scaled[:, : layout.n_drawn]) < FEWEST_BLOCKS:
+        if scaled is None or varying_rows(scaled[:, : layout.n_drawn]) < FEWEST_BLOCKS:
             continue
         for g, group in enumerate(layout.groups):
             by_chance = _correlation(scaled, layout.independent(group))
@@ -95,16 +95,6 @@ def whole_blocks(case_ids: np.ndarray, size: int) -> np.ndarray:
     block = case_ids[order] // size
     whole = np.bincount(block)[block] == size if block.size else np.zeros(0, dtype=bool)
     return order[whole].reshape(-1, size)
-
-
-def varying_blocks(centred: np.ndarray) -> int:
-    """Number of blocks float64[n_blocks, rows], mean 0, that make up most (`MOST_VARIANCE`) of the variance.
-
-    Of a flag that one case of a thousand has, or of a metric with rare large values, these are the few blocks with such
-    a case; the intervals from so few hold far too seldom.
-    """
-    largest = np.sort((centred**2).sum(axis=1))[::-1].cumsum()
-    return int(np.searchsorted(largest, MOST_VARIANCE * largest[-1])) + 1
 
 
 def _scaled(y: np.ndarray, drawn: np.ndarray) -> np.ndarray | None:

@@ -8,7 +8,8 @@ first_order  Var(E[metric | input]) / Var(metric): first-order Sobol' index, for
              inputs, 1 minus the sum of the indices is due to interactions
 total        E[Var(metric | all other inputs)] / Var(metric): effect of the input alone and with others (total Sobol'
              index), from a surrogate (`total_order`) of at least 200 cases; NaN for correlated inputs, for which it has
-             no such meaning
+             no such meaning, and where most of the variance is that of fewer than 40 cases, such as a rare flag's: two
+             of three inputs without effect had one
 
 For correlated inputs, src and prcc separate the inputs as far as the cases allow, while spearman and first_order
 include effects of the inputs with which one is correlated.  first_order and total have standard errors for independent
@@ -26,11 +27,12 @@ import numpy as np
 
 from mc_engine.statistics.first_order import first_orders, standardised
 from mc_engine.statistics.input_columns import InputColumn, average_ranks, beyond_chance, finite_rows, input_columns
-from mc_engine.statistics.moments import near_one
+from mc_engine.statistics.moments import near_one, varying_rows
 from mc_engine.statistics.total_order import FEWEST_CASES as FEWEST_OF_TOTALS
 from mc_engine.statistics.total_order import total_order
 
 FEWEST_CASES = 20
+FEWEST_VARYING = 40  # that make up most of a variance of which there are total effects
 _INDICES = ("spearman", "src", "prcc", "first_order", "first_order_error", "total", "total_error")
 
 
@@ -120,9 +122,11 @@ def _fill(
     alive = np.ix_(np.array(live), where)
     moved = [columns[k] for k in live]
     indices["first_order"][alive], indices["first_order_error"][alive] = first_orders(moved, varying, sobol)
-    if independent and n >= FEWEST_OF_TOTALS:
-        indices["total"][alive], indices["total_error"][alive], indices["unexplained"][where] = total_order(
-            moved, varying
+    spread = np.array([varying_rows(column[:, None]) >= FEWEST_VARYING for column in standardised(varying).T])
+    if independent and n >= FEWEST_OF_TOTALS and spread.any():
+        place = np.ix_(np.array(live), where[spread])
+        indices["total"][place], indices["total_error"][place], indices["unexplained"][where[spread]] = total_order(
+            moved, varying[:, spread]
         )
     ordered = [k for k in live if columns[k].ordered]
     if not ordered:

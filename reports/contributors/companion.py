@@ -8,9 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from mc_engine.statistics.input_columns import beyond_chance
-from mc_engine.statistics.moments import number_or_none
-from mc_engine.statistics.pick_freeze import MOST_VARIANCE
-from mc_engine.statistics.sensitivity import FEWEST_CASES, FEWEST_OF_TOTALS, Sensitivity
+from mc_engine.statistics.moments import MOST_VARIANCE, number_or_none
+from mc_engine.statistics.sensitivity import FEWEST_CASES, FEWEST_OF_TOTALS, FEWEST_VARYING, Sensitivity
 from reports.contributors.tornado_figure import STRONGEST, contributor_figure, name_of, strongest
 from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.run.chosen_units import spread_text
@@ -178,7 +177,8 @@ def _note(flown: Flown, contributions: Contributions, shown: list[str]) -> str:
         )
     elif any(row.total is None for row in rows):
         note += (
-            f" Total effects need {FEWEST_OF_TOTALS} cases with a number, or a section [sensitivity] of the campaign."
+            f" Total effects need {FEWEST_OF_TOTALS} cases with a number, and {FEWEST_VARYING} that make up "
+            f"{given_percent(MOST_VARIANCE)} of the variance, or a section [sensitivity] of the campaign."
         )
     return note
 

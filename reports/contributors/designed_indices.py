@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from mc_engine.statistics.designed_indices import FEWEST_BLOCKS, DesignedIndices, designed_indices
-from mc_engine.statistics.pick_freeze import MOST_VARIANCE
+from mc_engine.statistics.moments import MOST_VARIANCE
 from reports.contributors.tornado_figure import contributor_figure
 from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.run.contributions import Contributor

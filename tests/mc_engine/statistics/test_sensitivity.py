@@ -188,3 +188,17 @@ def test_a_correlated_input_keeps_what_it_owes_to_its_correlation_among_sobol_po
     assert first == pytest.approx(1.0, abs=1e-3)
     assert second > 0.4
     assert second == pytest.approx(sensitivity({"a": a, "b": b}, {"y": a}).first_order[1, 0])
+
+
+@pytest.mark.parametrize("rest", [0.0, 0.003])
+def test_what_few_cases_make_most_of_the_variance_of_has_no_total_effects(rest):
+    """Of a flag that one case of a hundred has, two of three inputs without effect had one, of up to 0.66."""
+    draw = np.random.default_rng(1)
+    inputs = {name: draw.normal(size=1000) for name in "xabcde"}
+    x = inputs["x"]
+    metrics = {"rare": (x > 2.33) + rest * x, "frequent": (x > 1.28) + rest * x, "plain": x + inputs["a"]}
+    found = sensitivity(inputs, metrics)
+    assert np.isfinite(found.total).all(axis=0).tolist() == [False, True, True]
+    assert np.isnan(found.total[:, 0]).all()
+    assert np.isnan([found.unexplained[0], *found.total_error[:, 0]]).all()
+    assert np.isfinite(found.first_order).all()

@@ -186,5 +186,6 @@ def test_a_table_of_few_cases_has_no_total_effects():
     assert {row.total for row in few.contributions.rows()} == {None}
     table = next(block for block in companion_blocks(few, few.contributions) if isinstance(block, Table))
     assert table.note.endswith(
-        "Total effects need 200 cases with a number, or a section [sensitivity] of the campaign."
+        "Total effects need 200 cases with a number, and 40 that make up 95\u202f% of the variance, or a section "
+        "[sensitivity] of the campaign."
     )
