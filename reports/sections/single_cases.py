@@ -39,7 +39,9 @@ def case_blocks(flown: Flown) -> Iterator[Block | str]:
     if axes is None:
         yield "Cases are not drawn by their outcome: fewer than two inputs or metrics differ between them."
         return
-    yield FigureBlock(f"Cases by outcome: {outcome_sentence(flown)}.", outcome_scatter(flown, *axes), "wide")
+    points = f" Points: {flown.held_words}." if flown.sampled else ""
+    caption = f"Cases by outcome: {outcome_sentence(flown)}.{points}"
+    yield FigureBlock(caption, outcome_scatter(flown, *axes), "wide")
 
 
 def case_axes(flown: Flown) -> tuple[str, str] | None:

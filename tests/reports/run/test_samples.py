@@ -18,6 +18,7 @@ from reports.sections.corridors import corridor_blocks
 from reports.sections.figure_blocks import distribution_blocks
 from reports.sections.levels import level_blocks
 from reports.sections.published import published_blocks
+from reports.sections.single_cases import case_blocks
 from reports.text.numbers import count
 
 BLOCKS = 4000
@@ -67,6 +68,7 @@ def test_few_failures_of_a_sample_are_not_those_of_all_cases(tmp_path, monkeypat
     said = [block for block in sensitivity_blocks(flown) if isinstance(block, str)]
     assert any(f", of {these} fewer than 5 failed or fewer than 5 passed: fuel" in one for one in said)
     assert next(distribution_blocks(flown)).caption.endswith(f" Bars: {these}.")
+    assert next(case_blocks(flown)).caption.endswith(f" Points: {these}.")
 
 
 def test_cases_of_a_sample_that_are_all_inside_are_not_all_cases(tmp_path, monkeypatch, made):
