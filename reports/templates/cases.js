@@ -246,6 +246,7 @@ const reportCases = (function () {
     figure.layout.title.text = "";
     for (const [axis, column] of [["xaxis", x], ["yaxis", y]]) {
       figure.layout[axis].title.text = reportFigures.plain(column.label);
+      figure.layout[axis].categoryorder = "category ascending"; // no before yes
     }
     document.getElementById(figure.id).parentNode.setAttribute("aria-label", `Scatter of ${y.label} against ${x.label}, a point a case.`);
     lift(chosen);
