@@ -71,9 +71,10 @@ def _further(flown: Flown, verdict: Verdict) -> str:
 
 
 def cost_cards(flown: Flown) -> tuple[Card, ...]:
-    """The key results: the metrics that the model maps, or those that matter."""
+    """The key results: the metrics of failed requirements, those that the model maps, then others that matter."""
+    failed = [verdict.metric for verdict in flown.verdicts if verdict.outcome == "fail"]
     mapped = [figure.metric for figure in flown.figures if isinstance(figure, MapFigure)]
-    names = [name for name in dict.fromkeys([*mapped, *flown.key_metrics]) if name in flown.summaries]
+    names = [name for name in dict.fromkeys([*failed, *mapped, *flown.key_metrics]) if name in flown.summaries]
     names.sort(key=lambda name: flown.summaries[name].n_used == 0)  # what no case has comes last
     return tuple(_cost_cards(flown, names[:MOST_COSTS]))
 

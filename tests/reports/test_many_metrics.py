@@ -29,3 +29,15 @@ def test_figures_and_tables_of_some_of_many_key_metrics_say_so():
     (section,) = [one for one in document.sections if one.title == "Contributors"]
     said = " ".join(text for one in section.blocks for text in getattr(one, "paragraphs", ()))
     assert "The effects on 7 other key metrics are not estimated." in said
+
+
+def test_a_metric_of_a_failed_requirement_is_a_key_result_wherever_it_stands():
+    """The first four metrics were the key results; the fifth, whose requirement failed, was not among them."""
+    run = synthetic_run(300, failed=0)
+    names = [column["name"] for column in run.manifest["columns"] if column["role"] == "metric"][:6]
+    common = {"at_least": None, "share": 0.5, "confidence": 0.9}
+    run.manifest["requirements"] = [{"name": name, "metric": name, "at_most": 1e9, **common} for name in names]
+    run.manifest["requirements"][4]["at_most"] = -1e9
+    run.manifest["figures"] = []
+    labels = [card.label for card in build(run, "run").costs]
+    assert labels == ["max position error", "correction impulse", "propellant", "peak force"]
