@@ -47,7 +47,7 @@ Steering = namedtuple(
 Turn = namedtuple("Turn", "sampled bank bank_rate next_bank next_rate", defaults=(0.0, 0.0, 0.0, 0.0, 0.0))
 # what law 3 keeps: speed lost W, reckoned range and its rate, measured deceleration, its logarithm over the stored one
 Reckoning = namedtuple("Reckoning", "lost range rate axial excess", defaults=(0.0, 0.0, 0.0, 0.0, 0.0))
-Events = namedtuple("Events", "pressure_peak heat_peak pull_out roll leave stop left over")
+Events = namedtuple("Events", "pressure_peak heat_peak pull_out roll leave stop left missed over")
 Place = namedtuple("Place", "altitude climb up")  # climb: rate of the altitude; up: unit vector
 # slope: of the logarithm of the density, by altitude [1/m]; v, speed: of the vehicle through the air [m/s]; shear: rate
 # of the speed, times it, per metre climbed, that a wind which changes with altitude brings [m/s^2]
@@ -207,6 +207,7 @@ def crossings(t, s, m, p, o):
         leave=NEVER if stops else above,
         stop=place.altitude - p.stop_altitude,
         left=above if stops else NEVER,
+        missed=place.altitude - p.missed if stops else NEVER,
         over=p.stop_time - t,
     )
 

@@ -63,7 +63,10 @@ Inputs = inputs(
     ),
     stop_altitude_km=Parameter(10.0, "geodetic altitude at which the flight ends on the way down"),
     exit_altitude_km=Parameter(
-        0.0, "altitude at which a climbing vehicle leaves the air; 0 takes that of entry", low=0.0
+        0.0,
+        "altitude at which a climbing vehicle leaves the air; one that did not sink below it does so at its entry "
+        "altitude; 0 takes the planned entry altitude",
+        low=0.0,
     ),
     stop_time_s=Parameter(1e9, "time at which the flight ends at the latest", low=0.0),
     target_downrange_km=Parameter(

@@ -81,6 +81,27 @@ def test_between_skips_the_vehicle_reaches_the_apoapsis_of_its_exit():
     assert seen["altitude_km"][after].max() == pytest.approx(row["exit_apoapsis_altitude_km"], rel=0.05)
 
 
+def test_a_pass_that_never_sinks_below_the_exit_altitude_ends_where_it_is_back_at_its_entry_altitude():
+    """About a point mass, without air, a pass leaves as fast and as steeply as it came."""
+    grazing = {"gravity": "point", "shape": "sphere", "rotating": False, "density_factor": 0.0, "entry_speed_m_s": 8e3}
+    error = np.array([-2.0, 0.0, 2.0])
+    rows = fly_cases(**grazing, entry_flight_path_angle_deg=-1.0, exit_altitude_km=90.0, entry_altitude_error_km=error)
+    assert rows["status"].tolist() == ["ok"] * 3
+    assert rows["min_altitude_km"].min() > 90.0
+    assert rows["final_altitude_km"] == pytest.approx(120.0 + error, abs=1e-5)
+    assert rows["exits"].tolist() == [1.0] * 3
+    assert rows["exit_flight_path_angle_deg"] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_vehicle_that_climbs_from_its_entry_altitude_has_not_left_the_air():
+    place = np.linspace(-80.0, 80.0, 40)
+    rows = fly_cases(
+        entry_speed_m_s=7e3, entry_flight_path_angle_deg=np.linspace(0.1, 2.0, 40), entry_latitude_deg=place
+    )
+    assert rows["exits"].tolist() == [0.0] * 40
+    assert rows["final_altitude_km"] == pytest.approx(10.0, abs=1e-5)
+
+
 DIP = {"vehicle": "apollo", "entry_speed_m_s": 11e3, "entry_flight_path_angle_deg": -6.5, "bank_deg": 10.0}
 ROLLS = {"roll_flight_path_angle_deg": 1.0, "rolled_bank_deg": 170.0, "roll_back_flight_path_angle_deg": -0.5}
 
