@@ -54,6 +54,7 @@ class Memory(NamedTuple):
     settled: float = 0.0  # 1 once the inspection counts as settled
     second: float = 0.0  # 1 between two burns that make a pair
     end: TransferEnd = NO_END
+    reference: float = 0.0  # longitude deviation [rad] from which that of longitude_sum is counted
     estimate: Estimate = NO_ESTIMATE
     after: Error = EXACT  # of the single fix that follows the next burn
     d1: float = 0.0  # fresh normal deviates for that burn
@@ -124,7 +125,7 @@ def phasing_change(t, s, m, p, o):
     dv = plan.dv
     if o.feedback > 0.5:
         x = navigated_elements(s, m.estimate)
-        y = half_turn(x.mean - (p.aim + RATE * t)) - plan.longitude  # of the mean longitude [rad]
+        y = half_turn(x.mean - (p.aim + RATE * t) - plan.longitude)  # of the mean longitude [rad]
         v = drift_of(x.a) - plan.drift  # [rad/rev]
         dv = dv - (plan.gain_y * y + plan.gain_v * v) / DRIFT_PER_DV
     return dv
@@ -177,7 +178,8 @@ def next_correction(t, s, m, p, o):
     n = corrections(o.tables)
     over = m.burns > n - 0.5
     ignition = maximum(planned(o.tables, where(over, n - 1.0, m.burns)).ignition, t + 1.0)
-    last = replace(m, due=t + SIDEREAL_DAY, mode=DAY_LATER, end=ended(t, s, p))
+    end = ended(t, s, p)
+    last = replace(m, due=t + SIDEREAL_DAY, mode=DAY_LATER, end=end, reference=end.longitude_deviation)
     return where(over, last, replace(m, due=ignition, mode=IGNITION))
 
 
@@ -185,8 +187,8 @@ def next_correction(t, s, m, p, o):
 def day_later(t, s, m, p):
     """The memory a sidereal day after the last phasing burn."""
     _, mean, _ = longitudes(t, s, p)
-    day_mean = (s.longitude_sum - m.end.longitude_sum) / SIDEREAL_DAY
-    day_drift = mean - m.end.mean_longitude_deviation
+    day_mean = half_turn(m.reference + (s.longitude_sum - m.end.longitude_sum) / SIDEREAL_DAY)
+    day_drift = half_turn(mean - m.end.mean_longitude_deviation)
     end = replace(m.end, daily_mean_longitude_deviation=day_mean, actual_drift_rate=day_drift)
     return replace(m, due=NEVER, mode=NOTHING, end=end)
 

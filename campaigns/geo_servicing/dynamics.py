@@ -31,7 +31,7 @@ State = states(
     mass_left_kg="mass of the servicing module",
     **{f"target_{axis}_m": f"place of the target module, {axis}" for axis in "xyz"},
     **{f"target_v{axis}_m_s": f"velocity of the target module, {axis}" for axis in "xyz"},
-    longitude_sum_s="integral of the longitude deviation, in radians",
+    longitude_sum_s="integral of the longitude deviation, in radians; after a transfer, of that from its end",
 )
 
 
@@ -70,13 +70,13 @@ def field(t, r, sun, moon, per_mass, p, o):
 def longitudes(t, s, p):
     """(true, mean) longitude of the servicing module less the required one [rad], in [-pi, pi]; and its elements."""
     elements = equinoctial(s.x, s.y, s.z, s.vx, s.vy, s.vz, MU)
-    return true_deviation(t, s, p), half_turn(elements.mean - (p.aim + RATE * t)), elements
+    return true_deviation(t, s, p.aim), half_turn(elements.mean - (p.aim + RATE * t)), elements
 
 
 @physics
-def true_deviation(t, s, p):
-    """Longitude of the servicing module less the required one [rad]."""
-    r = eci_to_ecef(s, p.aim + RATE * t)
+def true_deviation(t, s, aim):
+    """Longitude of the servicing module less that of which `aim` is the right ascension [rad] at the start."""
+    r = eci_to_ecef(s, aim + RATE * t)
     return atan2(r.y, r.x)
 
 
@@ -99,7 +99,7 @@ def rhs(t, s, m, p, o):
         target_v = Vector(s.target_vx, s.target_vy, s.target_vz)
         target_a = field(t, Vector(s.target_x, s.target_y, s.target_z), sun, moon, p.target_light, p, o)
     else:
-        away = true_deviation(t, s, p)
+        away = true_deviation(t, s, p.aim + m.reference)
     return State(
         x=s.vx, y=s.vy, z=s.vz, vx=a.x, vy=a.y, vz=a.z, mass_left=flow,
         target_x=target_v.x, target_y=target_v.y, target_z=target_v.z,

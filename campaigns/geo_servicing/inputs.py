@@ -118,7 +118,10 @@ Inputs = inputs(
         0.05, "tolerance of the final longitude, for the schedule and its gains", low=1e-6, high=10.0
     ),
     period_tolerance_s=Setting(
-        5.0, "tolerance of the final period, for the schedule and its gains", low=1e-6, high=1e4
+        5.0,
+        "tolerance of the final period about that of aim_drift_deg_rev, for the schedule and its gains",
+        low=1e-6,
+        high=1e4,
     ),
     eccentricity_tolerance=Setting(
         4e-4, "tolerance of the final eccentricity, for the schedule", low=1e-7, high=0.1, unit=""

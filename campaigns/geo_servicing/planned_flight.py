@@ -13,6 +13,7 @@ from campaigns.geo_servicing import dynamics
 from campaigns.geo_servicing.corrections import Burn, Memory, drift_of
 from campaigns.geo_servicing.drift_model import perturbation_coefficients
 from campaigns.geo_servicing.dynamics import MU, R0, RATE, SIDEREAL_DAY, State
+from mc_engine.physics.frames import half_turn
 from mc_engine.physics.gravity import point_mass
 from mc_engine.physics.sun_moon import ephemeris
 from mc_engine.physics.vectors import Vector, subtracted
@@ -63,9 +64,9 @@ class Craft:
         after = self.p.mass_left - flow * np.cumsum(burns)
         return self.p.exhaust * np.log((after + flow * burns) / after)
 
-    def fly(self, t: float, s: np.ndarray, length: float, push: float) -> np.ndarray:
-        """State float64[14] after an arc of this length [s] under a thrust ahead [N]."""
-        m = Memory(burn=Burn(dv=0.0, outward=0.0, ahead=push, across=0.0))
+    def fly(self, t: float, s: np.ndarray, length: float, push: float, reference: float = 0.0) -> np.ndarray:
+        """State float64[14] after an arc of this length [s] under a thrust ahead [N]; reference : see `Memory`."""
+        m = Memory(burn=Burn(dv=0.0, outward=0.0, ahead=push, across=0.0), reference=reference)
 
         def rates(time, y):
             return dynamics.rhs(time, State(*y), m, self.p, self.o)
@@ -83,6 +84,8 @@ class Craft:
             s = self.fly(t, s, burn, np.copysign(self.o.thrust, change))
             t += burn
         mean, _, e = self.seen(t, s)
-        after = self.fly(t, s, SIDEREAL_DAY, 0.0)
+        reference = dynamics.true_deviation(t, State(*s), self.aim)
+        after = self.fly(t, s, SIDEREAL_DAY, 0.0, reference)
         later, _, _ = self.seen(t + SIDEREAL_DAY, after)
-        return np.array(ignitions).T, End((after[-1] - s[-1]) / SIDEREAL_DAY, later - mean, e, t / SIDEREAL_DAY)
+        day_mean, drift = reference + (after[-1] - s[-1]) / SIDEREAL_DAY, later - mean
+        return np.array(ignitions).T, End(half_turn(day_mean), half_turn(drift), e, t / SIDEREAL_DAY)

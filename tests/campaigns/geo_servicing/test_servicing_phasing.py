@@ -53,6 +53,16 @@ def test_perfect_feedback_leaves_only_the_last_burns_error():
     assert row["drift_rate_deg_rev"].std() == pytest.approx(last, rel=0.15)
 
 
+def test_a_transfer_that_ends_opposite_the_target_is_the_same_with_its_longitudes_half_a_turn_away():
+    """Some cases cross the jump of the deviation at 180 degrees between plan and flight, some in the day after."""
+    errors = {"initial_longitude_error_deg": np.linspace(-0.06, 0.06, 5)}
+    near, opposite = (fly_cases(**FEEDBACK, **errors, target_longitude_deg=target) for target in (95.0, -85.0))
+    for name in ("delta_v_m_s", "actual_drift_rate_deg_rev"):
+        assert opposite[name] == pytest.approx(near[name], abs=1e-6)
+    name = "daily_mean_longitude_deviation_deg"
+    assert opposite[name] % 360.0 == pytest.approx(near[name] + 180.0, abs=1e-6)
+
+
 @pytest.mark.parametrize("aim", [0.0, 0.012])
 def test_the_dispersed_campaign_meets_every_tolerance(aim):
     """All dispersions of the campaign file, 2000 cases; with the drift half-way, by both readings of the period."""
