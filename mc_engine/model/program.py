@@ -161,6 +161,9 @@ def program_simulator(section: SimulatorSection, directory: Path, problems: Prob
         file = named or ""
         if os.path.isabs(file) or os.path.normpath(file).startswith("..") or "\0" in file:
             problems.append((key, f'"{file}" lies outside the folder of the case; name a file in it'))
+        if place := next((word for word in PLACES if f"{{{word}}}" in file), ""):
+            why = "is only replaced in `command`; each case has its own folder, so name the same file for all"
+            problems.append((key, f'the {{{place}}} of "{file}" {why}'))
     if section.result is not None and not section.result.endswith((".json", ".csv")):
         problems.append(("result", f'"{section.result}" ends in neither .json nor .csv'))
     if section.echo is not None and not (section.result or "").endswith(".json"):

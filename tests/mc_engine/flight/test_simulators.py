@@ -217,17 +217,14 @@ MISTAKES = {
     "not on the path": ('["./fall"', '["falls-nowhere"', 'no program "falls-nowhere" on the PATH'),
     "slots": ("time_limit_s = 60.0", "slots = 0", "simulator.slots: 0 is not allowed; it must be at least 1"),
     "unknown place": ("{folder}", "{foldr}", 'word 3: {foldr} is not known; did you mean "folder"?'),
+    "place": ('result = "result.json"', 'result = "{seed}.json"', 'the {seed} of "{seed}.json" is only replaced'),
     "never read": ('result = "result.json"', "", "is never read; give it a `pattern` over stdout"),
     "two things": ("[campaign]", '[campaign]\nsimulator = "sim.py"', "beside the table [simulator]"),
     "template": ("case.txt.j2", "other.j2", 'other.j2: "mas_kg" is no input; did you mean "mass_kg"?'),
     "filter": ("case.txt.j2", "filter.j2", "filter.j2, line 2: No filter named 'runden'."),
     "default": ("low = 0.1", "low = 20.0", "mass_kg: the model's own value 10 is not within"),
     "tolerance": ("time_limit_s", "tolerance = 1e-9\ntime_limit_s", "has a `tolerance`, and `replay` compares bits"),
-    "outside": (
-        '"case.txt" =',
-        '"../case.txt" =',
-        'input.../case.txt: "../case.txt" lies outside the folder of',
-    ),
+    "outside": ('"case.txt" =', '"../case.txt" =', 'input.../case.txt: "../case.txt" lies outside the folder of'),
 }
 
 
