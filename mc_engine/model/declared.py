@@ -25,7 +25,7 @@ from mc_engine.model.preparation import MISUSES, misuse
 from mc_engine.model.reading import ARGUMENTS
 from mc_engine.model.record import Model, Refusals
 from mc_engine.suggestions import hint, nearest
-from mc_engine.units import UNITS
+from mc_engine.units import UNITS, compatible, units_at_the_end
 
 _LONG = {"time": "t", "state": "s", "memory": "m", "parameters": "p", "settings": "o"}
 _TIME = Field("time since the start", name="t_s", unit="s")  # of histories
@@ -333,8 +333,9 @@ def _extrema(metrics: Any, outputs: Any, named: Mapping[str, Metric]) -> tuple[t
             raise ModelError(f'metric "{name}": the time "t_s" has no extremum; use at_end')
         unit = "s" if metric.source == "time" else known[output].unit
         if UNITS[units[name]].quantity != UNITS[unit].quantity:
+            meant = [f', or say unit="{ending}"' for ending in units_at_the_end(name) if ending in compatible(unit)]
             raise ModelError(f'metric "{name}" is in "{units[name]}", but it holds a value in "{unit}"; change its '
-                             "name or the output")  # fmt: skip
+                             f"name or the output{''.join(meant)}")  # fmt: skip
         if metric.extremum is not None:
             places[name] = tracked.setdefault(metric.extremum, symbols[name])
     return tuple(replace(extremum, name=name) for extremum, name in tracked.items()), places

@@ -108,6 +108,8 @@ MISTAKES = {
     "output": (('maximum_of("speed_m_s"', 'maximum_of("sped_m_s"'),
                'metric "top_speed_m_s": there is no output "sped_m_s"; did you mean "speed_m_s"?'),
     "unit of a metric": (("top_speed_m_s=", "top_speed_km="), 'metric "top_speed_km" is in "km", but it holds a value'),
+    "unit by chance": (('apogee_time_s=at_end("t_s"', 'time_above_5_g_s=at_end("t_s"'),
+                       'is in "g/s", but it holds a value in "s"; change its name or the output, or say unit="s"'),
     "suffix": (("altitude_km=Parameter", "altitude_kmm=Parameter"), '"altitude_kmm" ends in no unit; did you mean'),
     "event without function": (("Event(climb, ", "Event("), 'the event "apogee" has no function; declare it so: '),
     "argument of an event": (("def climb(s)", "def climb(x)"), 'event "apogee" in line 33 takes "x"'),
