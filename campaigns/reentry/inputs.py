@@ -68,7 +68,7 @@ Inputs = inputs(
         "altitude; 0 takes the planned entry altitude",
         low=0.0,
     ),
-    stop_time_s=Parameter(1e9, "time at which the flight ends at the latest", low=0.0),
+    stop_time_s=Parameter(1e9, "time at which the flight ends at the latest", low=1e-6),
     target_downrange_km=Parameter(
         0.0,
         "planned distance to the target along the track; 0: to the end of the reference path, or no target",

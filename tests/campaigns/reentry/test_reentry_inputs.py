@@ -8,6 +8,8 @@ from reentry_flights import MODEL, NOMINAL, fly_one
 from reentry_twin import MU, OMEGA, RADIUS
 
 from campaigns.reentry.vehicles import VEHICLES
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.errors import CampaignError
 from mc_engine.flight.flight import prepare
 
 
@@ -172,3 +174,10 @@ def test_a_flat_flight_has_its_range_ahead_and_its_crossrange_to_the_right():
     assert fly_one(**flat, bank_deg=0.0, density_factor=0.0, stop_altitude_km=100.0)["crossrange_km"] == pytest.approx(
         0.0, abs=1e-9
     )
+
+
+def test_a_flight_cannot_end_at_its_start_where_no_event_happens(tmp_path):
+    campaign = tmp_path / "campaign.toml"
+    campaign.write_text('[campaign]\nmodel = "campaigns.reentry"\ncases = 1\n[parameters]\nstop_time_s = 0.0\n')
+    with pytest.raises(CampaignError, match=r"parameters\.stop_time_s: 0"):
+        load_campaign(campaign)
