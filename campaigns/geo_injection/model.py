@@ -78,11 +78,14 @@ def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -
         for k, burn in enumerate(program.burns):
             ignitions[k, same], durations[k, same] = burn.ignition_s, burn.duration_s
     ignitions += [i.ignition_delay_1, i.ignition_delay_2, i.ignition_delay_3]
-    tail = settings.tail_off * i.tail_off_factor
-    late = (ignitions[1:] < ignitions[:-1] + durations[:-1] + tail).any(axis=0)
+    # the command comes half a nominal tail-off before the stored duration is over, and the tail-off spends half
+    tail, lead, burns = settings.tail_off * i.tail_off_factor, 0.5 * settings.tail_off, durations > 0.0
+    short = (burns & (durations <= lead)).any(axis=0)
+    refusals.add(short, "a burn is no longer than half of tail_off_s: its shutdown would be due before its ignition")
+    late = (ignitions[1:] < ignitions[:-1] + durations[:-1] - lead + tail).any(axis=0)
     refusals.add(late, "an ignition comes before the burn ahead of it has ended")
     mass, flow = settings.initial_mass * i.initial_mass_factor, settings.mass_flow * i.thrust_factor / i.isp_factor
-    spent = flow * (durations.sum(axis=0) + 0.5 * tail * (durations > 0.0).sum(axis=0))
+    spent = flow * (durations.sum(axis=0) + (0.5 * tail - lead) * burns.sum(axis=0))
     by_time = settings.shutdown == CHOICES.shutdown.time
     refusals.add(by_time & (spent >= mass), "the burns would take more propellant than the whole craft weighs")
     rows = vars(i) | dict(zip(("x", "y", "z", "vx", "vy", "vz"), states, strict=True))

@@ -170,6 +170,18 @@ def test_a_tail_off_of_known_length_hardly_moves_the_orbit_and_costs_no_propella
     assert longer["propellant_kg"] == pytest.approx(crisp["propellant_kg"] + 2 * 0.5 * 6.14, abs=1e-6)
 
 
+def test_burns_of_a_strong_engine_may_be_almost_as_short_as_half_the_tail_off():
+    """The shorter burn lasts 37 s, with the thrust of 6e5 N 25 s."""
+    strong = {"thrust_n": 4e5, "mass_flow_kg_s": 122.8, "tail_off_s": 60.0}
+    timed, sensed = fly_one(**strong), fly_one(**strong, shutdown="sensed_velocity")
+    assert timed["status"] == sensed["status"] == "ok"
+    assert timed["propellant_kg"] == pytest.approx(sensed["propellant_kg"], abs=1e-4)
+    for shutdown in ("time", "sensed_velocity"):
+        row = fly_one(thrust_n=6e5, mass_flow_kg_s=184.2, tail_off_s=60.0, shutdown=shutdown)
+        assert row["status"] == "refused"
+        assert "a burn is no longer than half of tail_off_s" in row["reason"]
+
+
 def test_sensed_velocity_takes_away_most_of_a_thrust_error_and_none_of_its_own_scale_error():
     timed, sensed = fly_one(thrust_factor=1.005), fly_one(thrust_factor=1.005, shutdown="sensed_velocity")
     assert sensed["correction_dv_m_s"] < 0.15 * timed["correction_dv_m_s"]
