@@ -30,6 +30,7 @@ IGNITION, CUT_OFF, DECISION, DAY_LATER, NOTHING = 0.0, 1.0, 2.0, 3.0, 4.0
 NEVER = 1e15  # s
 FIRST_LOOK = 1.0  # s: the inspection decides first when the first fix is there
 SHORTEST_BURN = 1e-6  # s
+SOON = 1e-6  # s, of an ignition at the start, where an event does not rise
 
 # velocity change that is commanded [m/s]; thrust [N] outward, ahead and to the normal
 Burn = namedtuple("Burn", "dv outward ahead across")
@@ -71,7 +72,7 @@ def start(o):
             due=maximum(o.observation, FIRST_LOOK), mode=DECISION, settled=where(o.settle_time > 0.0, 0.0, 1.0)
         )
     if o.phase == CHOICES.phase.phasing:
-        return Memory(due=planned(o.tables, 0.0).ignition, mode=IGNITION)
+        return Memory(due=maximum(planned(o.tables, 0.0).ignition, SOON), mode=IGNITION)
     return Memory()
 
 
