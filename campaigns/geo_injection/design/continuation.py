@@ -29,7 +29,7 @@ from campaigns.geo_injection.design.optimal import (
 )
 from mc_engine.errors import ModelError
 
-LARGE_THRUST = 5.0  # over the first weight: burns are then short arcs
+LARGE_THRUSTS = (5.0, 100.0, 1000.0)  # over the first weight: burns are then short arcs, near enough to impulses
 GENTLE_THRUST = 0.1  # over the first weight: burns are still short enough for another one to be put ahead of them
 WIDE = np.radians(20.0)  # plane change at which the search starts, if less is wanted
 _FIRST_STEP, _LONGEST_STEP, _LEAST_STEP = 0.1, 0.25, 1e-5  # of the way
@@ -145,9 +145,12 @@ def _from_node(problem: Problem, descending: bool = False) -> np.ndarray:
     About the descending node: from the mirror image about the earth's centre, which a circle allows.
     """
     wide = _widened(problem)
-    circle = replace(wide.with_thrust(max(LARGE_THRUST, wide.thrust)), eccentricity=0.0)
-    x = solve(circle, _impulsive_guess(circle))
-    if x is None:
+    for large in LARGE_THRUSTS:
+        circle = replace(wide.with_thrust(max(large, wide.thrust)), eccentricity=0.0)
+        x = solve(circle, _impulsive_guess(circle))
+        if x is not None:
+            break
+    else:
         raise ModelError("the search for the optimal burns did not start, not even at a large thrust")
     if descending:
         x[[3, 6]] *= -1.0  # the normal components

@@ -181,7 +181,13 @@ def solve(problem: Problem, guess: np.ndarray, instead: Instead | None = None) -
         if not np.isfinite(residuals(problem, guess[None])).all():
             return None
         x, left, _ = searched(conditions, guess, 60)
-    return x if left < SOLVED and (x[7:] > 0.0).all() else None
+    return x if left < SOLVED and (x[7:] > 0.0).all() and _ends_eastward(problem, x) else None
+
+
+def _ends_eastward(problem: Problem, x: np.ndarray) -> bool:
+    """Whether the final circle is flown in its own direction: the conditions hold for the opposite one, too."""
+    end = switch_states(problem, x[None])[0, -1]
+    return bool(end[0] * end[4] > end[1] * end[3])
 
 
 def is_optimal(solution: Solution, tolerance: float = 1e-9, n: int = 200) -> bool:

@@ -105,6 +105,17 @@ def test_two_and_three_burns_are_optima_where_the_range_is_sampled(inclination, 
     assert three < two
 
 
+@pytest.mark.parametrize(
+    ("inclination", "ratio"), [(28.5, 12.2), (0.0, 60.0), (60.0, 45.0), (90.0, 400_000.0 / 6578.137)]
+)
+def test_a_distant_circle_is_reached_in_its_own_direction_for_what_two_impulses_need(inclination, ratio):
+    problem = replace(sequence(2, inclination).problem().with_thrust(100.0), ratio=ratio)
+    best = optimum(problem)
+    assert used_kg(best) == pytest.approx(impulses_kg(problem), rel=1e-4)
+    end = best.states[-1]
+    assert np.cross(end[:3], end[3:6])[2] == pytest.approx(np.sqrt(ratio), rel=1e-9)
+
+
 @pytest.mark.slow
 def test_hardly_a_point_of_the_range_has_no_optimum_and_then_it_is_said():
     failed = []
