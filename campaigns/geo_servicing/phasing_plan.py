@@ -114,7 +114,7 @@ def first_approximations(craft: Craft, limits: Limits) -> list[Plan]:
     plans = []
     for longer in (0.0, 0.25, 0.5):
         shortest = limits.coasts.copy()
-        shortest[1:] += longer
+        shortest[1:] = np.maximum(shortest[1:] + longer, 0.01)  # no two impulses at once bring the craft to its place
         u, t = profile(craft.y, craft.v, limits.last, shortest)
         dv = u / drift_model.DRIFT_PER_DV
         burns = craft.burn_times(dv)

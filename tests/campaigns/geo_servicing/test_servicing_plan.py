@@ -235,9 +235,11 @@ def test_the_plan_keeps_its_limits_on_coasts_time_and_last_burn(first, least, lo
     assert np.abs(rows[:, 1]).sum() < 5.43
 
 
-def test_a_plan_that_begins_with_a_burn_is_flown_from_its_start():
+@pytest.mark.parametrize("least", [6.0, 0.0])
+def test_a_plan_that_begins_with_a_burn_is_flown_from_its_start(least):
+    """Warnings are errors here: without a least coast, the first approximation has no two impulses at once."""
     at_once = {"aim": "time", "first_coast_h": 0.0, "eccentricity_tolerance": 0.01, "initial_longitude_deg": 88.0}
-    flown = fly_one(**PERFECT, **at_once)
+    flown = fly_one(**PERFECT, **at_once, least_coast_h=least)
     assert flown["corrections"] == 3.0
     assert abs(flown["daily_mean_longitude_deviation_deg"]) < 1e-3
 
