@@ -37,8 +37,8 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
     # the numbers of a vehicle that is named take the place of the inputs
     rows |= airframe_rows(inputs, settings, airframe) | _bank_rows(inputs, settings)
     rows |= _target(inputs, world, planned, np.where(guided, along, inputs.target_downrange))
-    # 1 mm below the entry: rounding may put a start on either side of its own altitude
-    leaving = np.where(inputs.exit_altitude > 0.0, inputs.exit_altitude, altitude - 1e-3)
+    # 1 mm lower: a start at the exit altitude, which rounding puts on either side of it, is above
+    leaving = np.where(inputs.exit_altitude > 0.0, inputs.exit_altitude, altitude) - 1e-3
     rows |= {"exit": leaving, "missed": np.maximum(leaving, entry.altitude - 1e-3), "heading": planned.heading}
     rows |= {"relative_speed": entry.speed, "relative_flight_path_angle": entry.path}  # with their errors
     rows |= {"planned_range": along, "planned_share": plan.share, "planned_lift_to_drag": plan.lift_to_drag}

@@ -93,10 +93,14 @@ def test_a_pass_that_never_sinks_below_the_exit_altitude_ends_where_it_is_back_a
     assert rows["exit_flight_path_angle_deg"] == pytest.approx(1.0, abs=1e-6)
 
 
-def test_a_vehicle_that_climbs_from_its_entry_altitude_has_not_left_the_air():
+@pytest.mark.parametrize("exit_altitude", [0.0, 120.0])
+def test_a_vehicle_that_climbs_from_its_exit_altitude_has_not_left_the_air(exit_altitude):
     place = np.linspace(-80.0, 80.0, 40)
     rows = fly_cases(
-        entry_speed_m_s=7e3, entry_flight_path_angle_deg=np.linspace(0.1, 2.0, 40), entry_latitude_deg=place
+        entry_speed_m_s=7e3,
+        entry_flight_path_angle_deg=np.linspace(0.1, 2.0, 40),
+        entry_latitude_deg=place,
+        exit_altitude_km=exit_altitude,
     )
     assert rows["exits"].tolist() == [0.0] * 40
     assert rows["final_altitude_km"] == pytest.approx(10.0, abs=1e-5)
