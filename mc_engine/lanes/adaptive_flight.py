@@ -30,8 +30,8 @@ from mc_engine.lanes.adaptive_step import (
 )
 from mc_engine.lanes.aligned_stack import align_stack
 from mc_engine.lanes.compiler import compile_inline
-from mc_engine.lanes.events import Bracket, Search, crossed, searched
-from mc_engine.lanes.extrema import first_time
+from mc_engine.lanes.events import Bracket, crossed, narrow
+from mc_engine.lanes.extrema import PEAK, first_time
 from mc_engine.lanes.functions import any_lane, floor, maximum, minimum, replace, where
 from mc_engine.lanes.history import record_change, record_row, record_step
 from mc_engine.lanes.lane_access import lane_holds, store_lane, with_column, with_lane
@@ -58,18 +58,33 @@ Clock = namedtuple("Clock", "until rtol period attempts first longest order")
 # Of every lane: the instant that it has reached, length of its next step [s], the longest one before a suspected event
 # [s], the length whose error would have been 1 in its last step [s], number of its next sample, attempts, status
 Course = namedtuple("Course", "here h limit last_ideal sample attempts status")
-# What an attempt shows: where it is a step, where it has passed an event, hopes of crossings (see `arm`), its error
-Verdict = namedtuple("Verdict", "fits over hopes error")
+# The event that a step has passed: where one is looked for, hopes of that step (see `arm`), bracket, and the
+# instant behind the event
+Search = namedtuple("Search", "closing armed bracket beyond")
 
 _BROKEN, _CAPPED, _UNSTOPPED = float(NOT_FINITE), float(STEP_LIMIT), float(NO_STOP)
 _REACH = 1e-5  # of a step: length of the tangent over which rates are taken
+_CLOSED = 2e-15  # of time and length: the width at which the bracket of an event is closed
+_CREST = 1e-7  # of a step: the same for a peak, which is flat and differs by the square of this
 _AT_SAMPLE = 1e-12  # of the time: an event may be found so far behind a sample; a sample so near the end is not taken
 _NEVER, _NONE, _NAN = 1e300, 1e-300, float("nan")
 
 
 @physics
+def _watched(armed, sense):
+    """The sense where it is armed, else a constant, which crosses nothing."""
+    return where(armed > 0.5, sense, 1.0)
+
+
+@physics
 def _fires(armed, before, after, direction, mask):
     return mask & (armed > 0.5) & crossed(before, after, direction)
+
+
+@physics
+def _fires_sharply(kind, armed, before, after, direction):
+    """Mask: something else than a peak crosses, whose time is wanted to the last digits."""
+    return (kind != PEAK) & (armed > 0.5) & crossed(before, after, direction)
 
 
 @physics
@@ -174,32 +189,22 @@ def _prepared(f, clock, atol, key, case, new, unknown, course, p, o):
 prepared = compile_inline(_prepared)
 
 
-def _judged(kinds, signs, clock, course, stepping, best, length, trial, there, error):
-    """(course with the length of the next step, `Verdict`) after an attempt of length `trial` [s] that ended `there`.
+def _paced(clock, course, good, poor, dip, turn, trial, length, error):
+    """Course with the length of the next attempt, after a `good` or a `poor` one of length `trial` [s].
 
-    length : of a step that looks for no event [s].  best : see `best_value`
+    dip : where a good attempt has perhaps passed a turn, at the length `turn` [s]
+    length : of an attempt that looks for no event [s]
     """
-    here, h = course.here, course.h
-    good = stepping & (error <= 1.0)
-    hopes = map_fields(arm, kinds, here.senses, here.values, there.senses, there.values, best, trial)
-    over = any_field(map_fields(_fires, hopes, here.senses, there.senses, signs, good))
-    # whether such a step met an event cannot be told: it is tried shorter, as if its error were not a number
-    error = where(any_field(map_fields(is_lost, kinds, there.values)) & (not over), _NAN, error)
-    good = good & (error <= 1.0)
-    poor = stepping & (not good)
-    turn = least(map_fields(turn_length, kinds, here.senses, here.rates, there.senses, there.rates, trial))
-    dip = good & (turn < trial)  # before what the step crosses, perhaps
-    over = over & (not dip)
+    h = course.h
     cut = (length < h) & (not poor)
     ideal = trial * ideal_factor(error, -1.0 / clock.order)
     scaled = next_length(trial, error, ideal, where(good, course.last_ideal, _NONE))
     h = where(good, where(cut, maximum(h, scaled), scaled), where(poor, scaled, h))
     limit = where(dip, turn, where(good, clock.longest, course.limit))
-    course = replace(course, h=h, limit=limit, last_ideal=where(good, ideal, course.last_ideal))
-    return course, Verdict(good & (not over) & (not dip), over, hopes, error)
+    return replace(course, h=h, limit=limit, last_ideal=where(good, ideal, course.last_ideal))
 
 
-judged = compile_inline(_judged)
+paced = compile_inline(_paced)
 
 
 def _acted(f, clock, key, case, course, fired, sampled, arrived, closed, ended, p, o):
@@ -334,11 +339,29 @@ def _fly(
             new, altered = zero != zero, zero != zero
             continue
         stepping, looking = flying & (not search.closing), flying & search.closing
-        course, verdict = judged(kinds, signs, clock, course, stepping, best, length, trial, there, error)
+        good = stepping & (error <= 1.0)
+        hopes = map_fields(arm, kinds, here.senses, here.values, there.senses, there.values, best, trial)
+        over = any_field(map_fields(_fires, hopes, here.senses, there.senses, signs, good))
+        # whether such a step met an event cannot be told: it is tried shorter, as if its error were not a number
+        error = where(any_field(map_fields(is_lost, kinds, there.values)) & (not over), _NAN, error)
+        good = good & (error <= 1.0)
+        turn = least(map_fields(turn_length, kinds, here.senses, here.rates, there.senses, there.rates, trial))
+        dip = good & (turn < trial)  # before what the step crosses, perhaps
+        over = over & (not dip)
+        course = paced(clock, course, good, stepping & (not good), dip, turn, trial, length, error)
         closed = flying & (not flying)
-        if any_lane(verdict.over | looking):
-            search, closed = searched(kinds, signs, search, verdict.over, looking, verdict.hopes, trial, here, there)
-        arrived = verdict.fits | closed
+        if any_lane(over | looking):
+            armed = select(over, hopes, search.armed)
+            seen = map_fields(_watched, armed, there.senses)
+            sharp = any_field(map_fields(_fires_sharply, kinds, armed, here.senses, there.senses, signs))
+            enough = where(sharp, _CLOSED * (abs(here.t) + trial), maximum(_CREST * trial, _CLOSED * abs(here.t)))
+            at_start, rates = map_fields(_watched, armed, here.senses), here.rates
+            opened = Bracket(zero, trial, at_start, seen, rates, there.rates, zero, trial, zero, enough)
+            bracket = select(over, opened, search.bracket)
+            bracket, back, near = narrow(kinds, signs, bracket, seen, there.rates, over | looking)
+            search = Search(search.closing | over, armed, bracket, select(back, there, search.beyond))
+            closed = flying & search.closing & (near | (bracket.high - bracket.low <= bracket.width))
+        arrived = (good & (not over) & (not dip)) | closed
         now = select(closed, search.beyond, there)
         fired = map_fields(_fires, search.armed, here.senses, now.senses, signs, closed)
         stopped = closed & f.stops_of(fired)
@@ -348,7 +371,7 @@ def _fly(
         attempts = course.attempts + 1.0
         stuck = stepping & (not ended) & (course.h <= 1e-14 * abs(here.t) + 1e-290)
         failed = stuck | (flying & (not ended) & (attempts >= clock.attempts))
-        size = total(end) + verdict.error
+        size = total(end) + error
         status = where(failed, where(stuck & (not (size - size == 0.0)), _BROKEN, _CAPPED), course.status)
         if must_stop:
             status = where(ended & (not stopped), _UNSTOPPED, status)

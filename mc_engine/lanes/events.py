@@ -26,11 +26,6 @@ _SECANT_ITERATIONS = 40  # then bisection, which cannot stall
 # Part of an adaptive step that holds an event: lengths, senses and rates at both sides, which side moved last, next
 # length to look at, how often one was looked at, width at which it is closed
 Bracket = namedtuple("Bracket", "low high at_low at_high rate_low rate_high side look looks width")
-# The event that an adaptive step has passed: where one is looked for, hopes of that step (see `arm`), bracket, and the
-# instant behind the event
-Search = namedtuple("Search", "closing armed bracket beyond")
-_CLOSED = 2e-15  # of time and length: the width at which the bracket of an event is closed
-_CREST = 1e-7  # of a step: the same for a peak, which is flat and differs by the square of this
 _FEW = 3.0  # looks at an event with its width; then the width grows
 _CHORDS = 8.0  # then every other look halves the bracket, and the width stays: else it would be met far from the zero
 
@@ -223,31 +218,3 @@ def _narrow(kinds, signs, bracket, seen, rates, looking):
 
 
 narrow = compile_inline(_narrow)
-
-
-@physics
-def _watched(armed, sense):
-    """The sense where it is armed, else a constant, which crosses nothing."""
-    return where(armed > 0.5, sense, 1.0)
-
-
-@physics
-def _fires_sharply(kind, armed, before, after, direction):
-    """Mask: something else than a peak crosses, whose time is wanted to the last digits."""
-    return (kind != extrema.PEAK) & (armed > 0.5) & crossed(before, after, direction)
-
-
-def _searched(kinds, signs, search, over, looking, hopes, trial, here, there):
-    """(search, where the event is found) after a look `there`, which is also the far side where a search begins."""
-    armed = select(over, hopes, search.armed)
-    seen = map_fields(_watched, armed, there.senses)
-    sharp = any_field(map_fields(_fires_sharply, kinds, armed, here.senses, there.senses, signs))
-    width = where(sharp, _CLOSED * (abs(here.t) + trial), maximum(_CREST * trial, _CLOSED * abs(here.t)))
-    at_start, zero = map_fields(_watched, armed, here.senses), 0.0 * here.t
-    opened = Bracket(zero, trial, at_start, seen, here.rates, there.rates, zero, trial, zero, width)
-    bracket, back, near = narrow(kinds, signs, select(over, opened, search.bracket), seen, there.rates, over | looking)
-    found = (over | looking) & (near | (bracket.high - bracket.low <= bracket.width))
-    return Search(search.closing | over, armed, bracket, select(back, there, search.beyond)), found
-
-
-searched = compile_inline(_searched)
