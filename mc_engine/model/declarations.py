@@ -36,6 +36,18 @@ class Metric:
     output: str = ""
     event: str = ""
 
+    @property
+    def is_time(self) -> bool:
+        """Whether it is the time of an event, of an extreme, or of the end."""
+        return self.source == "time" or (self.source == "event" and not self.output) or self.output == "t_s"
+
+    @property
+    def of_output(self) -> str:
+        """The output whose largest, smallest or last value it is; empty for times and for values at events."""
+        if self.source == "value" and self.extremum is not None:
+            return self.extremum.quantity
+        return self.output if self.source == "end" and not self.is_time else ""
+
     def meaning(self, output: str) -> str:
         """The metric in words, made from the description of its output, such as "time of the smallest altitude"."""
         if self.event:

@@ -157,6 +157,8 @@ def model(
         event_list=kept.event_list(),
         phases=tuple(phases),
         extrema=tracked,
+        event_times=tuple(name for name, metric in metrics.computed.items() if metric.is_time),
+        metric_outputs=tuple((name, of) for name, metric in metrics.computed.items() if (of := metric.of_output)),
         tables=tables,
         figures=figures,
         data=data,

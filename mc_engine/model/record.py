@@ -75,6 +75,8 @@ class Model:
     event_list : tuple of Event, in the order of the components of `events`
     phases : tuple of str, the names of the phases, by the number that the discrete state holds
     extrema : tuple of Extremum
+    event_times : tuple of str, the metrics declared as the time of an event, of an extreme or of the end
+    metric_outputs : tuple of (metric, output), the metrics declared as the largest, smallest or last value of an output
     tables(o) : float64[n], see `model`
     watching : bool, set by the engine while it watches events
     reference : str, set by `load_model`
@@ -113,6 +115,8 @@ class Model:
     event_list: tuple[Event, ...] = ()
     phases: tuple[str, ...] = ()
     extrema: tuple[Extremum, ...] = ()
+    event_times: tuple[str, ...] = ()
+    metric_outputs: tuple[tuple[str, str], ...] = ()
     tables: Callable[..., np.ndarray] | None = None
     figures: tuple[Figure, ...] = ()
     data: tuple[str, ...] = ()

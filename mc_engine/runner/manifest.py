@@ -15,6 +15,7 @@ from mc_engine.campaign.loading import Campaign
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.model.fields import Named, Setting, inputs_of
 from mc_engine.model.figures import to_record
+from mc_engine.model.record import Model
 from mc_engine.model.simulator import System
 from mc_engine.sampling.streams import SEED_CONTRACT
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
@@ -68,6 +69,8 @@ def manifest_of(campaign: Campaign) -> dict[str, Any]:
         **_constant_inputs(campaign),
         "quantities": [_description(quantity) for quantity in model.quantities],
         "ranges": _ranges(campaign.model),
+        "event_times": list(model.event_times) if isinstance(model, Model) else [],
+        "metric_outputs": dict(model.metric_outputs) if isinstance(model, Model) else {},
         "requirements": [asdict(requirement) for requirement in campaign.requirements],
         "report": campaign.report.model_dump(),
         "looks": list(campaign.looks),

@@ -212,6 +212,8 @@ class _Manifest(Head):
     imported: _Imported | None = None
     sensitivity: _Sensitivity | None = None
     ranges: dict[str, Annotated[list[float | None], Field(min_length=2, max_length=2)]] = {}
+    event_times: list[str] = []
+    metric_outputs: dict[str, str] = {}
     columns: Annotated[list[ColumnRecord], AfterValidator(_each_once)]
 
     @model_validator(mode="after")

@@ -3,9 +3,9 @@
 An upper limit on the largest value holds along the whole flight; on the smallest value, as the miss of an approach, it
 holds at the end or must be reached once.  A lower limit likewise.
 
-A metric is that where its name ends with the quantity's, as peak_load_g with load_g, the units are the same, and in
-every saved case that completed the history bears it out: that sample is the metric within 1 % of its range, since the
-steps of the flight lie closer than the samples.
+A metric is that where the model declares it so, or where its name ends with the quantity's, as peak_load_g with load_g.
+The units must be the same, and every saved case that completed must bear it out: that sample is the metric within 1 %
+of its range, since the steps of the flight lie closer than the samples.
 """
 
 from collections.abc import Iterator
@@ -57,7 +57,8 @@ def _other_end(saved: list[tuple[float, np.ndarray]], side: float) -> str:
 
 def _saved(flown: Flown, metric: str, quantity: str) -> list[tuple[float, np.ndarray]]:
     """The metric and the history of every saved case that has both, if the metric may be an extreme of the quantity."""
-    if not metric.endswith(quantity) or flown.unit(metric) != flown.unit(quantity):
+    declared = flown.manifest.get("metric_outputs", {}).get(metric, quantity if metric.endswith(quantity) else "")
+    if declared != quantity or flown.unit(metric) != flown.unit(quantity):
         return []
     saved = list(_histories_of(flown, metric, quantity))
     return saved if len(saved) >= FEWEST else []

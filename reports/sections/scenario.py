@@ -81,10 +81,10 @@ def timeline_table(flown: Flown) -> Table | None:
 
     An event at 0 s is none of its own: an error that is largest as the flight begins, or one that never settles.
     """
-    times = {}
+    times, declared = {}, flown.manifest.get("event_times", [])
     for fact in flown.with_role("metric"):
         words, value = flown.words(fact.name), flown.own.nominal_value(fact.name)
-        is_event = words.endswith(" time") or fact.description.startswith(EVENTS)
+        is_event = fact.name in declared or words.endswith(" time") or fact.description.startswith(EVENTS)
         if value is not None and _is_time(flown.own.unit(fact.name)) and is_event:
             times[fact.name] = words.removesuffix(" time")
     events = {*times.values()}

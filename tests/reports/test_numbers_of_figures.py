@@ -99,6 +99,16 @@ def test_a_limit_that_the_saved_histories_do_not_bear_out_is_not_drawn(run):
     assert history_limits(Flown(run, "run"), ["force_n"]) == {}
 
 
+def test_a_limit_is_drawn_on_the_output_that_the_model_declares_for_the_metric_whatever_their_names():
+    run = peaked(PEAKS)
+    run.history = run.history.rename(columns={"force_n": "load_n"})
+    run.manifest["quantities"] = [{"name": "load_n", "unit": "N", "description": "load"}]
+    assert history_limits(Flown(run, "run"), ["load_n"]) == {}
+    run.manifest["metric_outputs"] = {"peak_force_n": "load_n"}
+    (limit,) = history_limits(Flown(run, "run"), ["load_n"])["load_n"]
+    assert (limit.at, limit.key) == (100.0, "required limit")
+
+
 def test_an_envelope_reaches_to_the_percentile_that_its_cases_support():
     assert [outer_percentile(n) for n in (20, 100, 200, 740, 741)] == [0.05, 0.01, 0.005, 0.005, 0.00135]
     slopes = np.random.Generator(np.random.Philox(key=7)).normal(size=800)

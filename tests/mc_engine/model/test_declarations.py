@@ -23,6 +23,7 @@ from mc_engine.model import (
     outputs,
     states,
 )
+from mc_engine.runner.manifest import manifest_of
 from mc_engine.units import unit_of
 
 
@@ -48,21 +49,34 @@ def test_what_the_files_of_a_model_declare_is_found_under_the_names_of_the_argum
         declared_in(files[0], SimpleNamespace(State="another"))
 
 
-def test_a_computed_metric_without_a_description_is_described_in_the_words_of_its_output(tmp_path):
+@pytest.fixture
+def computed(tmp_path):
+    """A campaign whose metrics are declared in each way that makes the engine compute them."""
     metrics = """Metrics = metrics(top_speed_m_s=maximum_of("speed_m_s"), low_km=minimum_of("altitude_km"),
         top_time_s=time_of_maximum("speed_m_s"), end_speed_m_s=at_end("speed_m_s"), end_s=at_end("t_s"),
         apogee_altitude_km=value_at("apogee", "altitude_km"), apogee_s=time_of("apogee"),
         fast_s=last_above("speed_m_s", 7e3), named_m_s=maximum_of("speed_m_s", "greatest speed"))"""
-    campaign = campaign_with(
+    return campaign_with(
         tmp_path,
         ("maximum_of, metrics,", "last_above, maximum_of, metrics, minimum_of, time_of, time_of_maximum, value_at,"),
         ("Metrics = metrics(", f"{metrics}\nOld = metrics("),
     )
-    assert [item.description for item in campaign.model.metrics] == [
+
+
+def test_a_computed_metric_without_a_description_is_described_in_the_words_of_its_output(computed):
+    assert [item.description for item in computed.model.metrics] == [
         "largest speed", "smallest altitude", "time of the largest speed", "speed at the end", "time at the end",
         "altitude at the event apogee", "time of the event apogee", "last time of the speed above its level",
         "greatest speed",
     ]  # fmt: skip
+
+
+def test_the_manifest_tells_which_metrics_are_times_and_of_which_output_others_are_an_extreme_or_the_end(computed):
+    manifest = manifest_of(computed)
+    assert manifest["event_times"] == ["top_time_s", "end_s", "apogee_s", "fast_s"]
+    assert manifest["metric_outputs"] == {
+        "top_speed_m_s": "speed_m_s", "low_km": "altitude_km", "end_speed_m_s": "speed_m_s", "named_m_s": "speed_m_s",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(

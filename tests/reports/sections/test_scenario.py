@@ -61,6 +61,18 @@ def test_a_time_whose_meaning_is_an_event_is_in_the_timeline(meaning):
     assert [row[0].text for row in table.rows] == ["Burn out 2", "Settling"]
 
 
+def test_a_metric_that_the_model_declares_as_a_time_is_in_the_timeline_whatever_its_name():
+    run = synthetic_run(50, failed=0)
+    run.manifest["columns"] += [
+        {"name": "first_within_s", "unit": "s", "role": "metric", "description": "inside 5 deg"}
+    ]
+    run.manifest["event_times"] = ["first_within_s"]
+    run.table = run.table.assign(first_within_s=90.0 + run.table["case_id"])
+    run.nominal_row |= {"first_within_s": 90.0}
+    table = next(one for one in section(run, "scenario").blocks if isinstance(one, Table))
+    assert [row[0].text for row in table.rows] == ["First within", "Settling"]
+
+
 def test_phases_of_the_nominal_case_are_in_the_timeline_and_marked_in_the_histories():
     run = synthetic_run(50, failed=0)
     t = run.history["t_s"]
