@@ -72,6 +72,8 @@ def _machine_facts(made: Mapping[str, Any]) -> dict[str, str]:
 def _campaign_facts(manifest: Mapping[str, Any]) -> dict[str, str]:
     campaign = manifest.get("campaign", {})
     facts = {key: str(campaign.get(key, "")) for key in ("model", "design", "seed", "cases")}
+    if looks := manifest.get("looks"):  # `cases` is then the number at the first interim analysis
+        facts["cases"] = f"until verdict, at most {looks[-1]}"
     for record in manifest.get("inputs", []):
         facts[f"dispersion {record['name']}"] = ", ".join(
             str(record[key]) for key in ("distribution", "bounds") if record.get(key)

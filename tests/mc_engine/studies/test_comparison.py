@@ -200,6 +200,13 @@ def test_what_changed_in_code_and_campaign_is_told(tmp_path):
     assert not found.changed
 
 
+def test_the_number_of_cases_of_a_run_until_verdict_is_the_largest_that_it_may_fly(tmp_path):
+    found = compared(run(tmp_path / "a"), run(tmp_path / "b", n=400, looks=[100, 200, 400]))
+    assert [(one.what, one.before, one.after) for one in found.campaign] == [
+        ("cases", "400", "until verdict, at most 400")
+    ]
+
+
 @pytest.mark.parametrize("n", [1, 2])
 def test_a_case_or_two_are_compared_without_a_test(tmp_path, n):
     found = compared(run(tmp_path / "a", n=n), run(tmp_path / "b", n=n, shift=1.0, noise=2))
