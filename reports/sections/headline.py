@@ -245,7 +245,7 @@ def _how_looked_at(flown: Flown) -> str:
         story = (
             f"The run was to end once every requirement passes or fails, with interim analyses after {steps} cases; "
         )
-        story += f"it ended after {flown_so_far}."
+        story += f"it {'ended after' if flown.n_wanted in looks else 'was then extended to'} {flown_so_far}."
     elif flown.n_tried < flown.n_wanted:
         story = f"The run has {count(flown.n_tried)} of {flown_so_far} cases so far."
     else:

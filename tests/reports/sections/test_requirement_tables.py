@@ -83,6 +83,8 @@ def test_a_run_extended_by_hand_says_so():
     warned = " ".join(warnings(flown(campaign=mc(500)))).replace("\u202f", " ")
     assert "began with 500 cases and was extended to 1 000" in warned
     assert "extended" not in " ".join(warnings(flown(campaign=mc())))
+    beyond = " ".join(warnings(flown(campaign=mc(100), looks=[100, 500, 800]))).replace("\u202f", " ")
+    assert "with interim analyses after 100, 500, 800 cases; it was then extended to 1 000." in beyond
 
 
 def test_a_run_that_is_not_complete_has_the_bounds_that_hold_at_every_number_of_cases():
