@@ -184,7 +184,7 @@ def _change_cards(comparison: Comparison) -> Iterator[Card]:
         yield Card(
             "Other requirements" if len(same) < len(comparison.verdicts) else "Requirements", "same verdicts", detail
         )
-    total = len(comparison.metrics)
+    total = len(comparison.metrics) - len(comparison.absent)
     for label, moved in (("Shift", comparison.shifted), ("Spread", comparison.spread)):
         ranked = sorted(moved, key=lambda change: -change.effect)
         names = ", ".join(words(change.metric, comparison.units[change.metric]) for change in ranked[:4])

@@ -243,6 +243,16 @@ def test_a_mean_that_a_few_extreme_cases_move_is_not_said_to_be_the_same():
     assert told["Shift"] == ("none significant", f"none of {len(found.metrics)} metrics")
 
 
+def test_a_metric_without_a_number_is_not_counted_among_those_without_a_change():
+    run, other = synthetic_run(400, failed=0), synthetic_run(400, failed=0, seed=2)
+    for one in (run, other):
+        one.table["settling_time_s"] = np.nan
+    found = compare_runs(run, other, ("before", "after"))
+    assert found.absent == ("settling_time_s",)
+    told = {card.label: card.detail for card in build_comparison(found).verdicts}
+    assert told["Spread"] == f"none of {len(found.metrics) - 1} metrics"
+
+
 def test_the_mean_of_each_run_has_the_digits_of_its_own_spread():
     found = compared(shift=9000.0)
     change = next(one for one in found.metrics if one.metric == "peak_force_n")
