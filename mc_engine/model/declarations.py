@@ -6,6 +6,7 @@ no unit, or its ending fits two units, the declaration states the unit: Paramete
 """
 
 from collections import namedtuple
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -345,11 +346,13 @@ def _field(what: str, name: str, item: Any) -> Field:
         raise ModelError(f'the {what} "{name}" is a metric; maximum_of and its like stand in metrics(...)')
     if not isinstance(item, str | Field):
         raise ModelError(f'the {what} "{name}" is {item!r}; it must be its meaning, a text, or Field("meaning", ...)')
-    return _with_unit(Field(item) if isinstance(item, str) else item, name)
+    if isinstance(item, str):
+        return _with_unit(Field(item), name, 'Field("...", unit="{}")'.format)
+    return _with_unit(item, name)
 
 
-def _with_unit(item: Any, name: str) -> Any:
-    """The number with its name, and with the unit that its name ends in."""
+def _with_unit(item: Any, name: str, said: Callable[[str], str] = 'unit="{}"'.format) -> Any:
+    """The number with its name, and with the unit that its name ends in; said : as in `unit_of`."""
     unit = item.unit
     if not isinstance(unit, str):
         raise ModelError(f'"{name}" has {unit!r} as its `unit`; it must be a text, such as "m/s"')
@@ -357,5 +360,5 @@ def _with_unit(item: Any, name: str) -> Any:
         raise ModelError(f'"{name}" has the unit "{unit}"{unit_hint(unit)}')
     if unit == OF_NAME:
         has_none = isinstance(item, Setting) and (item.choices or item.date or isinstance(item.default, bool))
-        unit = "" if has_none else unit_of(name)
+        unit = "" if has_none else unit_of(name, said)
     return replace(item, name=name, unit=unit)

@@ -89,7 +89,7 @@ def test_the_ending_of_a_name_tells_the_unit(name, unit):
 
 def test_a_unit_that_is_not_told_is_asked_for():
     for name, sentence in [
-        ("eccentricity", '"eccentricity" ends in no unit; say unit="" for a plain number'),
+        ("eccentricity", '"eccentricity" ends in no unit; say Field("...", unit="") for a plain number'),
         ("altitude_kilometres", 'ends in no unit; did you mean "altitude_km"?'),
         ("share_percent", 'did you mean "share_pct"?'),
         ("speed_mps", 'did you mean "speed_m_s"?'),
@@ -97,15 +97,17 @@ def test_a_unit_that_is_not_told_is_asked_for():
         ("push_ms2", 'did you mean "push_m_s2"?'),
         ("delay_sec", 'did you mean "delay_s"?'),
         ("angle_dge", 'did you mean "angle_deg"?'),
-        ("arm_n_m", 'may end in the unit N m or N/m; say which, unit="N m"'),
+        ("arm_n_m", 'may end in the unit N m or N/m; say which, Field("...", unit="N m")'),
         ("rate_deg_per_s", 'ends in no unit; did you mean "rate_deg_s"?'),
-        ("lapse_k_per_km", '"lapse_k_per_km" ends in no unit; say unit="" for a plain number'),
-        ("gain_1_s", 'may end in the unit 1/s or s; say which, unit="1/s"'),
+        ("lapse_k_per_km", '"lapse_k_per_km" ends in no unit; say Field("...", unit="") for a plain number'),
+        ("gain_1_s", 'may end in the unit 1/s or s; say which, Field("...", unit="1/s")'),
     ]:
         with pytest.raises(ModelError) as error:
             states(**{name: "a number"})
         assert sentence in str(error.value)
     assert states(eccentricity=Field("a number", unit=""))
+    with pytest.raises(ModelError, match='"throttle" ends in no unit; say unit="" for a plain number'):
+        inputs(throttle=Parameter(1.0, "share of the thrust"))
 
 
 # text of the smallest model, what stands in its place, the sentence
