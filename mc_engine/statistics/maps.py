@@ -9,8 +9,9 @@ The error has two parts.  One is the standard error of the fitted value, from th
 surface, which includes the effect of all other inputs.  The other is the bias from curvature within the neighbourhood,
 estimated by the difference to a cubic surface through the same cases (the correction of Calonico, Cattaneo & Farrell,
 J. Am. Stat. Assoc. 113 (2018), 767-779, here added to the error and not to the value).  Points outside the hull of the
-cases, in a gap between them, or with a large error are NaN, as a map does not extrapolate.  If the two inputs explain
-less than `LEAST_EXPLAINED` of the metric's variance in cross-validation, all points are NaN.
+cases, in a gap between them, among too few levels of an input for a cubic, or with a large error are NaN, as a map does
+not extrapolate.  If the two inputs explain less than `LEAST_EXPLAINED` of the metric's variance in cross-validation,
+all points are NaN.
 """
 
 from collections.abc import Sequence
@@ -336,8 +337,12 @@ class _Fit:
         widths, vectors = np.linalg.eigh(quadratic)
         fixed = widths[:, 0] > 1e-10 * widths[:, -1]
         safe = np.where(fixed[:, None, None], quadratic, np.eye(TERMS))
-        cubic_row = _value_row(*np.linalg.eigh(normal)) if cubic else None
-        return cls(near, weight, design, safe, _value_row(widths, vectors), cubic_row, fixed)
+        row, cubic_row = _value_row(widths, vectors), None
+        if cubic:
+            widths, vectors = np.linalg.eigh(normal)
+            cubic_row = _value_row(widths, vectors)
+            fixed &= widths[:, 0] > 1e-10 * widths[:, -1]  # on three levels of an input no bias between them shows
+        return cls(near, weight, design, safe, row, cubic_row, fixed)
 
     def value(self, z: np.ndarray) -> np.ndarray:
         """The quadratic at the points."""

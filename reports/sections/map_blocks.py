@@ -76,7 +76,7 @@ def _map_block(flown: Flown, figure: MapFigure, surfaces: Surfaces) -> FigureBlo
         few = f"the run has too few cases over {over} for a map"
         unsure = (
             f"nowhere is its surface over {over} sure enough: other inputs scatter it, the {count(used.size)} cases "
-            "are too few, or they lie on a line"
+            "are too few, or they lie on a line or on three levels of an input"
         )
         return f"{figure.title}: not drawn; {few if used.size < FEWEST else unsure}."
     rows = thinned_rows(used, flown.rows(flown.worst(figure.metric, WORST_RANKS)["case_id"]))

@@ -115,6 +115,16 @@ def test_a_hole_between_the_cases_stays_blank():
     assert np.isfinite(surface.value[(far > 1.1) & (far < 1.9)]).mean() > 0.99
 
 
+@pytest.mark.parametrize("n", [300, 2000])
+def test_no_surface_is_drawn_between_three_levels_of_an_input(n):
+    """A quadratic fits three levels exactly, whatever the metric does between them: the stated error was small."""
+    x, y = scattered(n)
+    level = np.round(np.clip(x, -1.0, 1.0))
+    surface = map_metric(level, y, level + y + np.sin(np.pi * level))
+    assert np.unique(level).size == 3
+    assert np.isnan(surface.value).all()
+
+
 def test_what_no_cross_validation_can_tell_is_not_told_as_all_of_the_variance():
     x, y = scattered(400)
     noise = np.random.Generator(np.random.Philox(key=9)).normal(size=400)
