@@ -100,10 +100,13 @@ def _checked_values(path: Path, item: Parameter | Setting, cells: np.ndarray, un
         if unit not in compatible(item.unit):
             return values  # noted with the dispersion; without a unit they have no range
         values = convert(values, unit, item.unit)
-    wrong = np.flatnonzero(~((values >= item.low) & (values <= item.high)))
-    if wrong.size:
-        where = f'"{path.name}", row {wrong[0] + 1}, column "{item.name}"'
-        raise FileFault(f"{where}: {number(values[wrong[0]])} is not within {accepted_range(item)}")
+    faults = {f"is not within {accepted_range(item)}": ~((values >= item.low) & (values <= item.high))}
+    if isinstance(item, Setting) and item.whole:
+        faults["is not a whole number"] = values != np.trunc(values)
+    for fault, wrong in faults.items():
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise FileFault(f'"{path.name}", row {row + 1}, column "{item.name}": {number(values[row])} {fault}')
     return values
 
 

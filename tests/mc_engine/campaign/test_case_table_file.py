@@ -70,6 +70,16 @@ def test_a_fault_in_the_table_is_refused_with_row_and_column(folder):
         assert problems("", "table", head=HEAD, directory=folder) == {"campaign.table": message}
 
 
+def test_a_whole_number_in_a_table_is_whole(folder):
+    """2.5 was flown, although all other designs refused it."""
+    toy = (folder / "toy.py").read_text().replace("Setting(0.5, ", "Setting(1.0, whole=True, description=")
+    (folder / "toy.py").write_text(toy)
+    message = '"cases.csv", row 2, column "step_s": 2.5 is not a whole number'
+    for cell, found in [("2", {}), ("2.5", {"campaign.table": message})]:
+        (folder / "cases.csv").write_text(f"step_s\n3\n{cell}\n")
+        assert problems("", "table", head=HEAD, directory=folder) == found
+
+
 def test_a_column_with_a_wrong_cell_is_not_called_missing(folder):
     (folder / "cases.csv").write_text(CSV.replace("1.5", "x"))
     found = problems('[dispersion.speed_pct]\nsource = "radar"', "table", head=HEAD, directory=folder)
