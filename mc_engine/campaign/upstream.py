@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from hashlib import sha256
+from itertools import count
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -199,17 +200,24 @@ def link(rows: Rows, section: InputsSection, model: System, own_columns: Iterabl
         findings.add("from", f"{what}; take another column or run")
     kept = [input_column(inputs[name]) for name in links]
     names: dict[str, str] = {}
-    used, prefix = {*own_columns, *_OURS, *inputs}, re.sub(r"\W+", "_", rows.facts["name"])
-    for column_ in rows.columns:
-        if column_.name == "case_id" or links.get(column_.name) == column_.name:
-            continue
-        name = column_.name if column_.name not in used else f"{prefix}_{column_.name}"
+    own = {*own_columns, *_OURS, *inputs}
+    columns = [column for column in rows.columns if column.name != "case_id" and links.get(column.name) != column.name]
+    prefix = _free_prefix(rows.facts["name"], [column.name for column in columns if column.name in own], upstream)
+    for column_ in columns:
+        name = column_.name if column_.name not in own else f"{prefix}_{column_.name}"
         role = "dispersion" if column_.role == "dispersion" else "upstream"
         description = f"{rows.facts['name']}: {column_.description}"
         names[column_.name] = name
         kept.append(Column(name, column_.unit, role, description, column_.kind))
         table[name] = rows.table[column_.name]
     return Upstream(rows, links, tuple(kept), names, table, nominal, failed)
+
+
+def _free_prefix(campaign: str, names: Iterable[str], used: Iterable[str]) -> str:
+    """What stands before names that the campaign's own columns use; numbered where a chain has one name repeatedly."""
+    word = re.sub(r"\W+", "_", campaign)
+    prefixes = (f"{word}_{k}" if k > 1 else word for k in count(1))
+    return next(prefix for prefix in prefixes if not {f"{prefix}_{name}" for name in names} & {*used})
 
 
 def _links(upstream: Mapping[str, Column], section: InputsSection, model: System, findings: Findings) -> dict[str, str]:

@@ -1,5 +1,7 @@
 """A chain of simulators whose first campaign has yet to be flown."""
 
+import pandas as pd
+
 from tests.mc_engine.command_line.cart import call
 
 SIMULATOR = """
@@ -26,3 +28,21 @@ def test_check_does_not_ask_whether_an_input_moves_a_metric_where_no_input_was_m
         checked = call("check", tmp_path / f"{name}.toml")
         assert checked.exit_code == 0, checked.output
         assert ("does an input move it?" in checked.stdout) == asked
+
+
+def test_a_campaign_that_is_flown_again_and_again_from_its_own_run_keeps_the_columns_of_every_flight(tmp_path):
+    """The third flight had two columns called again_status, and no manifest could be written."""
+    (tmp_path / "factor.py").write_text(SIMULATOR)
+    (tmp_path / "again.toml").write_text(HEAD + DISPERSED)
+    runs = [tmp_path / f"run_{k}" for k in range(4)]
+    for before, here in zip([None, *runs], runs, strict=False):
+        if before is not None:
+            source = f'[inputs]\nfrom = "{before.name}"\ncolumns = {{ length_m = "twice_m" }}\n'
+            (tmp_path / "again.toml").write_text(HEAD + source)
+        flown = call("run", tmp_path / "again.toml", "--out", here, "--no-report")
+        assert flown.exit_code == 0, flown.output
+    first, second, third, last = (pd.read_parquet(here / "cases") for here in runs)
+    for name, own in [("again_twice_m", first), ("again_2_twice_m", second), ("again_3_twice_m", third)]:
+        assert last[name].tolist() == own["twice_m"].tolist()
+    assert last["again_2_length_m"].tolist() == last["again_twice_m"].tolist()
+    assert last["twice_m"].tolist() == (16.0 * first["length_m"]).tolist()
