@@ -89,6 +89,8 @@ def _chosen(states: list[UncertainState], section: CovarianceSection) -> Uncerta
         raise MessageFault(
             f"has no covariance at {section.epoch}; it has {', '.join(state.epoch for state in states[:5])}"
         )
+    if len(chosen) > 1:
+        raise MessageFault(f"has {len(chosen)} covariances at {section.epoch}; leave only one of them in the file")
     return chosen[0]
 
 

@@ -17,6 +17,7 @@ from mc_engine.numbers_in_text import is_real
 
 AXES = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
 LOCAL = ("RTN", "TNW")
+_ROTATING = ("ITRF", "GRC", "TDR")  # how the names of Earth-fixed frames begin; their velocities are relative
 NO_EPOCH = "is not an epoch such as 2026-01-31T12:00:00"
 _REPEATED = "MAN_"  # how the keywords of an OPM begin that each of its manoeuvres has again
 _SAME = {"RSW": "RTN", "RIC": "RTN"}  # other names of the same axes
@@ -68,6 +69,11 @@ class UncertainState:
             )
         if self.state is None:
             raise MessageFault(f"there is no state at {self.epoch} to lay the axes {frame} along")
+        if self.frame.startswith(_ROTATING):
+            raise MessageFault(
+                f"the axes {frame} need an inertial velocity; that of the state is relative to {self.frame}, which "
+                f"rotates with the Earth: give the state in an inertial frame"
+            )
         r, v = self.state[:3], self.state[3:]
         normal = np.cross(r, v)
         if not np.linalg.norm(normal) > 0.0:

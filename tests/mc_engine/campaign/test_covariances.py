@@ -279,6 +279,27 @@ def test_the_epoch_chooses_among_the_covariances_of_an_ephemeris(folder):
         load_campaign(folder)
 
 
+def test_two_covariances_at_the_epoch_asked_for_are_refused(folder):
+    """The first one was taken, as of an ephemeris with a segment before and one after a manoeuvre."""
+    (folder / "state.opm").write_text(oem("1998-12-18T15:28:15", "1998-12-18T15:28:15.0"))
+    place, message = only_problem(folder, CAMPAIGN.replace('"EME2000"', '"RTN"\nepoch = "1998-12-18T15:28:15"'))
+    assert (place, "has 2 covariances at 1998-12-18T15:28:15; leave only one" in message) == (
+        "covariance.launch.file",
+        True,
+    )
+
+
+@pytest.mark.parametrize("frame", ["ITRF-97", "ITRF2008", "GRC", "TDR"])
+def test_local_axes_are_not_laid_along_a_velocity_relative_to_the_earth(frame):
+    """They were turned by up to some degrees."""
+    message = read_message(opm().replace("EME2000", frame))[0]
+    assert np.array_equal(message.covariance_in(frame), MATRIX)
+    with pytest.raises(MessageFault, match=f"RTN need an inertial velocity; that of the state is relative to {frame}"):
+        message.covariance_in("RTN")
+    with pytest.raises(MessageFault, match="TNW need an inertial velocity"):
+        read_message(opm("TNW").replace("EME2000", frame))[0].covariance_in(frame)
+
+
 def test_the_section_that_the_documentation_shows_disperses_a_shipped_campaign(tmp_path):
     page = Path(mc_engine.__file__).parent / "documentation" / "how_to" / "orbit_messages.md"
     section = page.read_text(encoding="utf-8").split("```text\n")[1].split("```")[0]
