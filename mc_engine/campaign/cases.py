@@ -1,6 +1,5 @@
 """The case table: the inputs of any cases of a campaign, each a function of (campaign, seed, case_id) alone."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from mc_engine.errors import CampaignError, Problem
 from mc_engine.model.fields import Setting
 from mc_engine.sampling.designs import BY_LEVELS, EXTENSIBLE, grid_levels, one_at_a_time_levels, unit_cube
 from mc_engine.sampling.distributions import column, quantiles
+from mc_engine.status import MOST_CASES
 from mc_engine.units import convert
 
 _UNITLESS_KEYS = ("log_sigma", "alpha", "beta")
@@ -27,7 +27,8 @@ def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray
 
     campaign : Campaign
     case_ids : int64[n], numbers of the cases, in any order.  Of a design that can be extended ("mc", "sobol",
-        "saltelli", "morris") they may exceed the campaign's number: they are then cases of a campaign with more cases.
+        "saltelli", "morris") they may exceed the campaign's number, up to the 10^9 cases of the largest campaign: they
+        are then cases of a campaign with more cases.
 
     Returns a dict with one column per dispersion, in file order and declared units: float64[n], bool[n], or object[n]
     of words.  A row depends on (campaign, seed, case_id) alone.
@@ -67,17 +68,15 @@ def _checked_ids(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
         one: Any = next((item for item in items if type(item) is not int), next(iter(items), []))
         message = f"a case is a whole number from 0 to {campaign.cases - 1}, and {one!r} is none"
         raise CampaignError(campaign.name, [Problem("", message)])
-    ids = given.astype(np.int64)
     if campaign.first is not None:
         message = f'has yet to be flown; `mc-engine run` flies "{campaign.first.name}" before this campaign'
         raise CampaignError(campaign.name, [Problem("inputs.from", message)])
-    beyond = ids >= (math.inf if is_endless(campaign) else campaign.cases)
-    if ids.size and (ids.min() < 0 or beyond.any()):
-        wrong = int(ids[(ids < 0) | beyond][0])
-        raise CampaignError(
-            campaign.name, [Problem("", f"there is no case {wrong}; they are 0 to {campaign.cases - 1}")]
-        )
-    return ids
+    n_cases = MOST_CASES if is_endless(campaign) else campaign.cases
+    beyond = given >= n_cases  # before the conversion, in which the largest unsigned numbers become negative
+    if (wrong := given[(given < 0) | beyond]).size:
+        last = n_cases - 1 if beyond.any() else campaign.cases - 1
+        raise CampaignError(campaign.name, [Problem("", f"there is no case {wrong[0]}; they are 0 to {last}")])
+    return given.astype(np.int64)
 
 
 def is_endless(campaign: Campaign) -> bool:

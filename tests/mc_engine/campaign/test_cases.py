@@ -7,8 +7,9 @@ from toy import load
 
 from mc_engine.campaign.cases import case_table, dispersion_records, full_inputs
 from mc_engine.errors import CampaignError
-from mc_engine.sampling.designs import RANDOM
+from mc_engine.sampling.designs import EXTENSIBLE, RANDOM
 from mc_engine.sampling.streams import stream
+from mc_engine.status import MOST_CASES
 
 BODY = """
 [dispersion.speed_pct]
@@ -76,6 +77,17 @@ def test_the_draws_follow_the_distributions_and_the_correlation(design):
 def test_a_case_that_the_campaign_does_not_have_is_refused(case):
     with pytest.raises(CampaignError, match=f"there is no case {case}; they are 0 to 63"):
         case_table(load(BODY, "lhs", cases=64), np.array([0, case]))
+
+
+@pytest.mark.parametrize("design", EXTENSIBLE)
+def test_a_design_without_end_has_the_cases_of_the_largest_campaign_and_no_others(design):
+    """Beyond 2^32 cases the Sobol' points were those of other cases."""
+    body = '[dispersion.speed_pct]\ndist = "normal"\nsigma = 1\n'
+    campaign = load(body, design, cases=60)
+    assert np.isfinite(case_table(campaign, [MOST_CASES - 1])["speed_pct"]).all()
+    for case in (MOST_CASES, 2**32 + 5, 2**64 - 1):
+        with pytest.raises(CampaignError, match=f"there is no case {case}; they are 0 to {MOST_CASES - 1}"):
+            case_table(campaign, np.array([case], dtype=np.uint64))
 
 
 def test_all_inputs_are_the_nominal_ones_but_for_the_dispersed_columns():
