@@ -248,7 +248,8 @@ class Beta(Distribution):
     def ppf(self, u: np.ndarray) -> np.ndarray:
         from scipy.special import betaincinv
 
-        return self.lower + (self.upper - self.lower) * betaincinv(self.alpha, self.beta, u)
+        x = self.lower + (self.upper - self.lower) * betaincinv(self.alpha, self.beta, u)
+        return np.minimum(x, self.upper)  # which the sum may exceed by its rounding
 
 
 @dataclass(frozen=True)

@@ -53,6 +53,11 @@ def test_quantiles_rise_and_stay_in_the_support(ours):
     assert low <= x[0] < x[-1] <= high
 
 
+def test_a_beta_draw_does_not_exceed_the_upper_end_by_its_rounding():
+    """0.3 + (0.9 - 0.3) is 0.9000000000000001, which a model with the range up to 0.9 refused."""
+    assert quantiles(Beta(2.0, 0.2, 0.3, 0.9), np.array([0.9, 1.0 - 1e-9, 1.0])).max() == 0.9
+
+
 def test_no_draw_of_a_tail_that_is_cut_below_alone_is_infinite():
     """Even where the share below the cut and the largest number below 1 round to 1."""
     largest = [quantiles(Truncated(Normal(0.0, 1.0), cut, math.inf), np.array([1.0]))[0] for cut in np.linspace(-3, 0)]
