@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mc_engine.campaign.dispersions import Dispersion
-from mc_engine.campaign.inputs import accepted_range, check_value, number
+from mc_engine.campaign.inputs import accepted_range, check_value, number, within_rounding
 from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.sections import CampaignSection
 from mc_engine.campaign.tables_beside import numbers, read_columns, switches, words
@@ -100,6 +100,8 @@ def _checked_values(path: Path, item: Parameter | Setting, cells: np.ndarray, un
         if unit not in compatible(item.unit):
             return values  # noted with the dispersion; without a unit they have no range
         values = convert(values, unit, item.unit)
+        outside = (values < item.low) | (values > item.high)
+        values[outside] = [within_rounding(value, item) for value in values[outside].tolist()]
     faults = {f"is not within {accepted_range(item)}": ~((values >= item.low) & (values <= item.high))}
     if isinstance(item, Setting) and item.whole:
         faults["is not a whole number"] = values != np.trunc(values)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mc_engine.campaign.distribution_keys import DispersionContext, build_distribution, checked_values
-from mc_engine.campaign.inputs import check_value, number
+from mc_engine.campaign.inputs import about, check_value, number, within_rounding
 from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.sections import DISTRIBUTIONS, DispersionSection
 from mc_engine.model.fields import Parameter, Setting
@@ -77,16 +77,16 @@ def _own_unit(section: DispersionSection, item: Parameter | Setting, findings: F
         findings.add("unit", f'"{unit}" is not a unit of {meaning}{hint(unit, compatible(item.unit))}{absolute}')
         unit = None
     if unit is not None:
-        options = {key: _converted(key, value, unit, item.unit) for key, value in options.items()}
+        options = {key: _converted(key, value, unit, item) for key, value in options.items()}
     return SimpleNamespace(**{"dist": None, **options})
 
 
-def _converted(key: str, value: Any, unit: str, to: str) -> Any:
+def _converted(key: str, value: Any, unit: str, item: Parameter | Setting) -> Any:
     if key in _WITHOUT_UNIT or isinstance(value, bool | str) or value is None:
         return value
     if isinstance(value, list):
-        return [_converted(key, number, unit, to) for number in value]
-    return convert(value, unit, to)
+        return [_converted(key, number, unit, item) for number in value]
+    return within_rounding(convert(value, unit, item.unit), item)
 
 
 def _check_keys_fit(spec: Mapping[str, Any], design: str, context: DispersionContext) -> None:
@@ -167,7 +167,7 @@ def _span(context: DispersionContext, distribution: Distribution | None) -> tupl
         context.findings.add("lower", f"{number(bounds[0])} is not below upper = {number(bounds[1])}")
     elif len(reaches) == 1 and not bounds:
         centre = float(context.nominal) if keys.mean is None else keys.mean
-        return centre - reaches[0], centre + reaches[0]
+        return about(centre, reaches[0], context.item)
     else:
         context.findings.add("", "needs lower and upper, or half_range, or three_sigma, and only one of these")
     return None

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
-from mc_engine.campaign.inputs import accepted_range, check_value, number
+from mc_engine.campaign.inputs import about, accepted_range, check_value, number, within_rounding
 from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.sections import LARGEST
 from mc_engine.campaign.tables_beside import empirical_numbers
@@ -150,7 +150,7 @@ def _bounds(context: DispersionContext, middle: str) -> tuple[float, float] | No
         return (keys.lower, keys.upper) if _in_order(context, keys.lower, keys.upper) else None
     if keys.half_range is not None and plain == [None, None]:
         centre = _given_or_nominal(getattr(keys, middle), context)
-        return centre - keys.half_range, centre + keys.half_range
+        return about(centre, keys.half_range, context.item)
     context.findings.add("", "needs lower and upper, or half_range, not a mixture of them")
     return None
 
@@ -206,7 +206,8 @@ def _empirical(context: DispersionContext) -> Distribution | None:
         context.findings.add("file", str(fault))
         return None
     if keys.unit is not None:
-        measured = tuple(convert(value, keys.unit, context.item.unit) for value in measured)
+        converted = (convert(value, keys.unit, context.item.unit) for value in measured)
+        measured = tuple(within_rounding(value, context.item) for value in converted)
     lower, upper = _cut(context)
     if not _in_order(context, lower, upper):
         return None

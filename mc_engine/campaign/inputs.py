@@ -1,10 +1,14 @@
 """Checks of single values against the model's inputs, and how values are written in messages."""
 
+from math import isclose
+
 from mc_engine.campaign.reading import Findings, shown
 from mc_engine.dates import EXAMPLE, date_text, modified_julian_date
 from mc_engine.model.fields import Parameter, Setting
 from mc_engine.sampling.distributions import Scalar
 from mc_engine.suggestions import hint, listed
+
+_ROUNDING = 1e-15  # 35 cm is 0.35000000000000003 m
 
 
 def check_value(value: Scalar, item: Parameter | Setting, findings: Findings, key: str) -> Scalar | None:
@@ -49,6 +53,22 @@ def _checked_date(value: Scalar, item: Setting, findings: Findings, key: str) ->
         findings.add(key, f"{shown(value)} is not allowed; the model accepts {accepted_range(item)}")
         return None
     return date_text(date)
+
+
+def within_rounding(value: float, item: Parameter | Setting) -> float:
+    """`value`, or the end of the range of `item` where only the rounding of a unit's conversion keeps it off."""
+    return _near_end(value, item, 0.0)
+
+
+def about(centre: float, reach: float, item: Parameter | Setting) -> tuple[float, float]:
+    """centre - reach and centre + reach, at the ends of the range of `item` where only rounding keeps them off."""
+    size = abs(centre)
+    return _near_end(centre - reach, item, size), _near_end(centre + reach, item, size)
+
+
+def _near_end(value: float, item: Parameter | Setting, size: float) -> float:
+    ends = (item.low, item.high)
+    return next((end for end in ends if isclose(value, end, rel_tol=_ROUNDING, abs_tol=_ROUNDING * size)), value)
 
 
 def accepted_range(item: Parameter | Setting) -> str:

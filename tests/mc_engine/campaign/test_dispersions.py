@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
-from toy import load, problems
+from toy import HEAD, HERE, load, problems
 
+from mc_engine.campaign.cases import case_table
 from mc_engine.sampling.distributions import (
     Beta,
     Constant,
@@ -176,3 +177,34 @@ def test_a_grid_takes_values_or_equal_steps_between_bounds():
     ]:
         assert levels(body) == pytest.approx(expected)
     assert levels("half_range = 2", "one_at_a_time") == (8.0, 12.0)
+
+
+@pytest.mark.parametrize(
+    ("design", "body"),
+    [
+        ("mc", 'dist = "uniform"\nlower = 10\nupper = 35\nunit = "cm"'),  # 35 cm is 0.35000000000000003 m
+        ("mc", 'dist = "beta"\nalpha = 2\nbeta = 2\nlower = 10\nupper = 35\nunit = "cm"'),
+        ("mc", 'dist = "discrete"\nvalues = [10, 35]\nunit = "cm"'),
+        ("mc", 'dist = "constant"\nvalue = 35\nunit = "cm"'),
+        ("mc", 'dist = "empirical"\nfile = "lengths.csv"\nunit = "cm"'),
+        ("mc", 'dist = "uniform"\nhalf_range = 17.5\nunit = "cm"'),  # about 0.175 m: 0 to 0.35 m
+        ("mc", 'dist = "triangular"\nmode = 0.21\nhalf_range = 0.14'),  # 0.35 is the next number below the sum
+        ("grid", 'values = [10, 35]\nunit = "cm"'),
+        ("one_at_a_time", 'half_range = 17.5\nunit = "cm"'),
+        ("table", 'unit = "cm"'),
+    ],
+)
+def test_an_end_of_the_range_is_reached_in_any_unit_and_by_any_sum(tmp_path, design, body):
+    """The message was "reaches 0.1 to 0.35; the model accepts 0 to 0.35 m"."""
+    toy = (
+        (HERE / "toy.py")
+        .read_text()
+        .replace('height_km=Parameter(10.0, "Height")', 'length_m=Parameter(0.175, "L", low=0.0, high=0.35)')
+    )
+    for name, text in {"toy.py": toy, "lengths.csv": "length_m\n10\n35\n"}.items():
+        (tmp_path / name).write_text(text)
+    head = HEAD + ('table = "lengths.csv"\n' if design == "table" else "")
+    campaign = load(f"[dispersion.length_m]\n{body}", design, directory=tmp_path, head=head)
+    drawn = case_table(campaign, np.arange(campaign.cases))["length_m"]
+    ends = campaign.dispersions[0].distribution.support if design == "mc" else (drawn.min(), drawn.max())
+    assert (ends[1], drawn.max() <= 0.35, ends[0] >= 0.0) == (0.35, True, True)
