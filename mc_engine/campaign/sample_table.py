@@ -24,13 +24,21 @@ def drawn_inputs(campaign: Campaign) -> dict[str, np.ndarray]:
 
 
 def write_sample(campaign: Campaign, table: Mapping[str, np.ndarray], path: Path) -> None:
-    """Write the table as `path`'s ending says, one of SUFFIXES; either serves as a campaign's `table`."""
+    """Write the table as `path`'s ending says, one of SUFFIXES.
+
+    Either serves as a campaign's `table`, unless it has columns of an upstream run.
+    """
     if path.suffix == ".csv":
         write_durably(path, csv_text(pd.DataFrame(table)).encode())
         return
-    columns = [CASE_COLUMNS[0]]
+    known = {"case_id": CASE_COLUMNS[0]}
+    if campaign.upstream is not None:
+        known |= {column.name: column for column in campaign.upstream.columns}
+    columns = []
     for name, values in table.items():
-        if name != "case_id":
+        if name in known:
+            columns.append(known[name])
+        else:
             item = campaign.model.input(name)
             columns.append(Column(name, item.unit, "dispersion", item.description, _KINDS[values.dtype.kind]))
     write_durably(path, parquet_bytes(arrow_table(columns, table, campaign.cases, path)))

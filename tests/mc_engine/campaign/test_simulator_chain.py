@@ -46,3 +46,17 @@ def test_a_campaign_that_is_flown_again_and_again_from_its_own_run_keeps_the_col
         assert last[name].tolist() == own["twice_m"].tolist()
     assert last["again_2_length_m"].tolist() == last["again_twice_m"].tolist()
     assert last["twice_m"].tolist() == (16.0 * first["length_m"]).tolist()
+
+
+def test_the_sample_of_a_chain_is_written_with_the_columns_of_the_run_upstream(tmp_path):
+    """As Parquet it ended with KeyError: "'first_status'"."""
+    (tmp_path / "factor.py").write_text(SIMULATOR)
+    (tmp_path / "first.toml").write_text(HEAD + DISPERSED)
+    (tmp_path / "second.toml").write_text(HEAD + '[inputs]\nfrom = "first"\ncolumns = { length_m = "twice_m" }\n')
+    assert call("run", tmp_path / "first.toml", "--out", tmp_path / "first", "--no-report").exit_code == 0
+    for ending, read in [(".csv", pd.read_csv), (".parquet", pd.read_parquet)]:
+        written = call("sample", tmp_path / "second.toml", "--out", tmp_path / f"drawn{ending}")
+        assert written.exit_code == 0, written.output
+        drawn, flown = read(tmp_path / f"drawn{ending}"), pd.read_parquet(tmp_path / "first" / "cases")
+        assert drawn["length_m"].tolist() == flown["twice_m"].tolist()
+        assert drawn["first_status"].tolist() == flown["status"].tolist()
