@@ -135,7 +135,9 @@ def _triangular(context: DispersionContext) -> Distribution | None:
     if bounds is None:
         return None
     if not bounds[0] <= mode <= bounds[1]:
-        context.findings.add("mode", f"{number(mode)} is not between {number(bounds[0])} and {number(bounds[1])}")
+        given = "" if context.keys.mode is not None else "the nominal value "
+        ends = f"{number(bounds[0])} and {number(bounds[1])}"
+        context.findings.add("mode", f"{given}{number(mode)} is not between {ends}")
         return None
     return Triangular(bounds[0], mode, bounds[1])
 

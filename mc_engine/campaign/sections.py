@@ -166,8 +166,8 @@ class BetaDispersion(DispersionSection):
     """Between lower and upper, density (x - lower)^(alpha - 1) (upper - x)^(beta - 1)."""
 
     dist: Literal["beta"]
-    alpha: Positive = Field(description="a positive number")
-    beta: Positive = Field(description="a positive number")
+    alpha: float = Field(gt=0.0, le=1e12, description="a positive number")  # beyond, SciPy computes no quantiles
+    beta: float = Field(gt=0.0, le=1e12, description="a positive number")
     lower: Number = Field(description="smallest value")
     upper: Number = Field(description="largest value")
 

@@ -88,10 +88,12 @@ MISTAKES = [
     ('dist = "uniform"\nlower = 2\nupper = 1', "lower", "2 is not below upper = 1"),
     ('dist = "uniform"\nlower = 1\nupper = 2\nmean = 1', "mean", IDLE),
     ('dist = "uniform"\nminimum = 1\nupper = 2', "minimum", 'is not a known key; did you mean "lower"?'),
-    ('dist = "triangular"\nlower = 1\nupper = 2', "mode", "10 is not between 1 and 2"),
+    ('dist = "triangular"\nlower = 1\nupper = 2', "mode", "the nominal value 10 is not between 1 and 2"),
     ('dist = "lognormal"\nmedian = 3', "", "needs median with log_sigma, or mean with sigma"),
     ('dist = "lognormal"\nmedian = 3\nsigma = 1', "", "needs median with log_sigma, or mean with sigma"),
     ('dist = "beta"\nalpha = 1\nbeta = 1\nlower = 2\nupper = 1', "lower", "2 is not below upper = 1"),
+    ('dist = "beta"\nalpha = 2\nbeta = 1e16\nlower = 1\nupper = 2', "beta",
+     "1e+16 is not allowed; it must be at most 1e+12"),  # SciPy answers NaN, and cases flew with it
     ('dist = "discrete"\nvalues = [1, 2]\nweights = [1]', "weights", "1 weights for 2 values"),
     ('dist = "discrete"\nvalues = [1, 2]\nweights = [1, 2, 3]', "weights", "3 weights for 2 values"),
     ('dist = "discrete"\nvalues = [1, 2]\nweights = [0, 0]', "weights", "are all zero"),
