@@ -146,7 +146,7 @@ def _oem(lines: list[tuple[int, str]]) -> Iterator[UncertainState]:
             own = _plain_frame(value)
         elif inside and key == "EPOCH":
             _check_rows(number, rows)
-            own, epoch, rows = frame, value, []
+            epoch, rows = value, []
         elif inside and not equals:
             if len(rows) == 6:
                 raise MessageFault(f"line {number}: a seventh row; a covariance has six, the next begins with EPOCH")
@@ -158,6 +158,7 @@ def _oem(lines: list[tuple[int, str]]) -> Iterator[UncertainState]:
                 lower = np.array([row + [0.0] * (6 - len(row)) for row in rows])
                 matrix = lower + np.tril(lower, -1).T
                 yield UncertainState(epoch, frame, states.get(_moment(number, epoch)), own, matrix)
+                own = frame  # of the next one, which may name another, before or after its epoch
         elif not equals and len(line.split()) in (7, 10):
             when, *numbers = line.split()
             states[_moment(number, when)] = np.array([_finite_number(number, word) for word in numbers[:6]])

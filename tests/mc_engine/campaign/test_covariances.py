@@ -1,6 +1,7 @@
 """Covariances of orbit messages in, end states out."""
 
 import csv
+import re
 import shutil
 from pathlib import Path
 
@@ -157,6 +158,15 @@ def test_a_covariance_without_a_frame_is_in_that_of_its_segment_whatever_frame_t
     head, one, two, three = oem(*epochs).split("EPOCH = ")
     text = "EPOCH = ".join([head, one, two.replace("COV_REF_FRAME = RTN\n", ""), three])
     assert [state.covariance_frame for state in read_message(text)] == ["RTN", "EME2000", "RTN"]
+
+
+def test_the_frame_of_a_covariance_may_stand_before_its_epoch():
+    """It was overlooked, and the covariance taken as one in the frame of the segment."""
+    text = oem("1998-12-18T14:28:15", "1998-12-18T15:28:15", "1998-12-18T16:28:15")
+    turned = re.sub("(EPOCH = .*\n)(COV_REF_FRAME = RTN\n)", r"\2\1", text)
+    assert [state.covariance_frame for state in read_message(turned)] == 3 * ["RTN"]
+    without = turned.replace("COV_REF_FRAME = RTN\nEPOCH = 1998-12-18T15", "EPOCH = 1998-12-18T15")
+    assert [state.covariance_frame for state in read_message(without)] == ["RTN", "EME2000", "RTN"]
 
 
 def test_a_state_is_of_its_own_segment_and_may_have_accelerations():
