@@ -185,7 +185,7 @@ def solve(problem: Problem, guess: np.ndarray, instead: Instead | None = None) -
 
 
 def _ends_eastward(problem: Problem, x: np.ndarray) -> bool:
-    """Whether the final circle is flown in its own direction: the conditions hold for the opposite one, too."""
+    """Whether the final circle is flown eastward: eq. (17) of the source holds in the opposite direction, too."""
     end = switch_states(problem, x[None])[0, -1]
     return bool(end[0] * end[4] > end[1] * end[3])
 
