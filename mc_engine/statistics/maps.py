@@ -9,9 +9,9 @@ The error has two parts.  One is the standard error of the fitted value, from th
 surface, which includes the effect of all other inputs.  The other is the bias from curvature within the neighbourhood,
 estimated by the difference to a cubic surface through the same cases (the correction of Calonico, Cattaneo & Farrell,
 J. Am. Stat. Assoc. 113 (2018), 767-779, here added to the error and not to the value).  Points outside the hull of the
-cases, in a gap between them, among too few levels of an input for a cubic, or with a large error are NaN, as a map does
-not extrapolate.  If the two inputs explain less than `LEAST_EXPLAINED` of the metric's variance in cross-validation,
-all points are NaN.
+cases, in a gap between them, or with a large error are NaN, as a map does not extrapolate.  All points are NaN if the
+two inputs explain less than `LEAST_EXPLAINED` of the metric's variance in cross-validation, or if one of them has fewer
+than `FEWEST_LEVELS` levels.
 """
 
 from collections.abc import Sequence
@@ -37,6 +37,7 @@ WIDEST_HOLE = 0.6  # of the reach of the neighbourhood: where the nearest case i
 MOST_CASES = 50_000  # smoothed; of more, so many are picked evenly
 LEAST_EXPLAINED = 0.2  # share of the variance of the metric
 MOST_ERROR = 0.05  # of the range of the metric; above it a point is left blank
+FEWEST_LEVELS = 4  # of an input: a quadratic passes through any three values, whatever the metric is between them
 TERMS = 6  # of a quadratic in two variables; a cubic has four more
 POINTS_AT_ONCE = 256
 
@@ -212,6 +213,11 @@ class _Cloud:
         hull = _hull(places)
         return None if hull is None else cls(rows, places, ends, centre, scale, hull, scipy.spatial.cKDTree(places))
 
+    @property
+    def has_levels(self) -> bool:
+        """Whether both inputs have enough levels for a surface between them."""
+        return all(np.unique(column.round(9)).size >= FEWEST_LEVELS for column in self.places.T)
+
     def axes(self, points: int) -> tuple[np.ndarray, np.ndarray]:
         """A grid over both inputs."""
         (left, right), (low, high) = self.ends
@@ -240,10 +246,10 @@ def _smoothed(
     middles, spreads = [float(z.mean()) for z in metrics], [float(np.ptp(z)) or 1.0 for z in metrics]
     shapes = [(z[cloud.rows] - middle) / spread for z, middle, spread in zip(metrics, middles, spreads, strict=True)]
     choices = _chosen_neighbours(cloud, shapes)
-    explained = [k for k, (_, share) in enumerate(choices) if not share < LEAST_EXPLAINED]
+    drawn = [k for k, (_, share) in enumerate(choices) if not share < LEAST_EXPLAINED and cloud.has_levels]
     fitted: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-    for neighbours in {choices[k][0] for k in explained}:
-        together = [k for k in explained if choices[k][0] == neighbours]
+    for neighbours in {choices[k][0] for k in drawn}:
+        together = [k for k in drawn if choices[k][0] == neighbours]
         surfaces = _surfaces(cloud, [shapes[k] for k in together], neighbours, points)
         fitted.update(zip(together, surfaces, strict=True))
     maps: list[SurfaceMap | None] = []
@@ -337,12 +343,8 @@ class _Fit:
         widths, vectors = np.linalg.eigh(quadratic)
         fixed = widths[:, 0] > 1e-10 * widths[:, -1]
         safe = np.where(fixed[:, None, None], quadratic, np.eye(TERMS))
-        row, cubic_row = _value_row(widths, vectors), None
-        if cubic:
-            widths, vectors = np.linalg.eigh(normal)
-            cubic_row = _value_row(widths, vectors)
-            fixed &= widths[:, 0] > 1e-10 * widths[:, -1]  # on three levels of an input no bias between them shows
-        return cls(near, weight, design, safe, row, cubic_row, fixed)
+        cubic_row = _value_row(*np.linalg.eigh(normal)) if cubic else None
+        return cls(near, weight, design, safe, _value_row(widths, vectors), cubic_row, fixed)
 
     def value(self, z: np.ndarray) -> np.ndarray:
         """The quadratic at the points."""

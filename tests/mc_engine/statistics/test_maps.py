@@ -125,6 +125,15 @@ def test_no_surface_is_drawn_between_three_levels_of_an_input(n):
     assert np.isnan(surface.value).all()
 
 
+@pytest.mark.parametrize("levels", [5, 8, 10, 15])
+def test_a_smooth_surface_between_more_levels_is_drawn_everywhere(levels):
+    """Some neighbourhoods hold only three of them."""
+    draw = np.random.Generator(np.random.Philox(key=3))
+    x, y = draw.integers(0, levels, 400) / (levels - 1.0), draw.uniform(0.0, 1.0, 400)
+    surface = map_metric(x, y, np.sin(x) + y * y + x * y, points=41)
+    assert np.isfinite(surface.value).mean() > 0.9
+
+
 def test_what_no_cross_validation_can_tell_is_not_told_as_all_of_the_variance():
     x, y = scattered(400)
     noise = np.random.Generator(np.random.Philox(key=9)).normal(size=400)
