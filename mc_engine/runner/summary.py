@@ -138,7 +138,7 @@ def analyses_line(store: Store) -> str:
     if (flown := _flown(store)) < store.n_cases and not looks:
         history = f"{flown:,} of {store.n_cases:,} cases so far"
     elif looks and store.n_cases not in looks:
-        history = f"extended to {store.n_cases:,} cases after interim analyses of at most {looks[-1]:,} cases"
+        history = f"extended to {store.n_cases:,} cases after a run until verdict of at most {looks[-1]:,} cases"
     elif looks:
         scheduled = sum(look <= store.n_cases for look in looks)
         analyses = f"{scheduled} interim {'analysis' if scheduled == 1 else 'analyses'}"

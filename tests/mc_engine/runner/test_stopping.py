@@ -74,7 +74,7 @@ def test_a_decided_run_is_not_carried_on_and_one_extended_by_hand_keeps_its_limi
     first = fly_until_decided(campaign, tmp_path / "run", **NO_PROGRESS)
     assert carry_on(tmp_path / "run", **NO_PROGRESS).n_cases == first.n_cases
     extended = runner.extend(tmp_path / "run", first.n_cases + 20, workers=1)
-    told = f"extended to {first.n_cases + 20} cases after interim analyses of at most 2,000 cases; "
+    told = f"extended to {first.n_cases + 20} cases after a run until verdict of at most 2,000 cases; "
     assert analyses_line(extended).startswith(told)
     before, after = judgement(first)[0][0], judgement(extended)[0][0]
     assert after.looked
