@@ -63,9 +63,10 @@ def _checked_ids(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
         given = np.atleast_1d(case_ids)
     except ValueError:  # of lists in a list
         given = np.array([case_ids], dtype=object)
-    if given.ndim > 1 or (given.size and given.dtype.kind not in "iu"):
-        items = given.tolist()
-        one: Any = next((item for item in items if type(item) is not int), next(iter(items), []))
+    items = [] if given.dtype.kind in "iu" else given.tolist()
+    wrong = [item for item in items if type(item) is not int]  # whole numbers beyond 64 bits are objects to NumPy
+    if given.ndim > 1 or wrong:
+        one: Any = next(iter(wrong or given.tolist()), [])
         message = f"a case is a whole number from 0 to {campaign.cases - 1}, and {one!r} is none"
         raise CampaignError(campaign.name, [Problem("", message)])
     if campaign.first is not None:
@@ -73,9 +74,9 @@ def _checked_ids(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
         raise CampaignError(campaign.name, [Problem("inputs.from", message)])
     n_cases = MOST_CASES if is_endless(campaign) else campaign.cases
     beyond = given >= n_cases  # before the conversion, in which the largest unsigned numbers become negative
-    if (wrong := given[(given < 0) | beyond]).size:
+    if (others := given[(given < 0) | beyond]).size:
         last = n_cases - 1 if beyond.any() else campaign.cases - 1
-        raise CampaignError(campaign.name, [Problem("", f"there is no case {wrong[0]}; they are 0 to {last}")])
+        raise CampaignError(campaign.name, [Problem("", f"there is no case {others[0]}; they are 0 to {last}")])
     return given.astype(np.int64)
 
 
