@@ -141,7 +141,8 @@ def evaluate(t, s, m, p, o):
     hottest = where(now.heat_rate > met.hottest.heat_rate, now, met.hottest)
     lowest = where(met.pull_out.min_altitude_time >= 0.0, met.pull_out, PullOut(now.altitude, t))
     ground = ground_of(s, now.altitude, p, o)
-    leaves = (o.on_exit == CHOICES.on_exit.stop) & (now.altitude > p.exit - 1e-3) & (ground.flight_path_angle > 0.0)
+    # a flight that ends on the way up, and not for its time, has left the air
+    leaves = (o.on_exit == CHOICES.on_exit.stop) & (t < p.stop_time) & (ground.flight_path_angle > 0.0)
     first = where(leaves, exit_of(t, s, p, o), met.first_exit)
     violations = (
         where(pressed.load > p.corridor_load, 1.0, 0.0)

@@ -81,16 +81,29 @@ def test_between_skips_the_vehicle_reaches_the_apoapsis_of_its_exit():
     assert seen["altitude_km"][after].max() == pytest.approx(row["exit_apoapsis_altitude_km"], rel=0.05)
 
 
+# about a point mass, without air
+GRAZING = {"gravity": "point", "shape": "sphere", "rotating": False, "density_factor": 0.0}
+GRAZING |= {"entry_speed_m_s": 8e3, "entry_flight_path_angle_deg": -1.0}
+
+
 def test_a_pass_that_never_sinks_below_the_exit_altitude_ends_where_it_is_back_at_its_entry_altitude():
-    """About a point mass, without air, a pass leaves as fast and as steeply as it came."""
-    grazing = {"gravity": "point", "shape": "sphere", "rotating": False, "density_factor": 0.0, "entry_speed_m_s": 8e3}
+    """It leaves as fast and as steeply as it came."""
     error = np.array([-2.0, 0.0, 2.0])
-    rows = fly_cases(**grazing, entry_flight_path_angle_deg=-1.0, exit_altitude_km=90.0, entry_altitude_error_km=error)
+    rows = fly_cases(**GRAZING, exit_altitude_km=90.0, entry_altitude_error_km=error)
     assert rows["status"].tolist() == ["ok"] * 3
     assert rows["min_altitude_km"].min() > 90.0
     assert rows["final_altitude_km"] == pytest.approx(120.0 + error, abs=1e-5)
     assert rows["exits"].tolist() == [1.0] * 3
     assert rows["exit_flight_path_angle_deg"] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_flight_that_ends_at_stop_time_on_its_way_up_has_not_left_the_air():
+    """Above the exit altitude, but not yet back at the entry altitude; a pass takes 647 s."""
+    times = np.array([500.0, 600.0, 700.0])
+    rows = fly_cases(**GRAZING, exit_altitude_km=90.0, stop_time_s=times)
+    assert rows["status"].tolist() == ["ok"] * 3
+    assert rows["exits"].tolist() == [0.0, 0.0, 1.0]
+    assert np.isnan(rows["exit_time_s"]).tolist() == [True, True, False]
 
 
 @pytest.mark.parametrize("exit_altitude", [0.0, 120.0])
