@@ -202,7 +202,8 @@ def link(rows: Rows, section: InputsSection, model: System, own_columns: Iterabl
     names: dict[str, str] = {}
     own = {*own_columns, *_OURS, *inputs}
     columns = [column for column in rows.columns if column.name != "case_id" and links.get(column.name) != column.name]
-    prefix = _free_prefix(rows.facts["name"], [column.name for column in columns if column.name in own], upstream)
+    twice = [column.name for column in columns if column.name in own]
+    prefix = _free_prefix(rows.facts["name"], twice, {*upstream, *own})
     for column_ in columns:
         name = column_.name if column_.name not in own else f"{prefix}_{column_.name}"
         role = "dispersion" if column_.role == "dispersion" else "upstream"

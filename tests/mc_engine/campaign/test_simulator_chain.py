@@ -60,3 +60,20 @@ def test_the_sample_of_a_chain_is_written_with_the_columns_of_the_run_upstream(t
         drawn, flown = read(tmp_path / f"drawn{ending}"), pd.read_parquet(tmp_path / "first" / "cases")
         assert drawn["length_m"].tolist() == flown["twice_m"].tolist()
         assert drawn["first_status"].tolist() == flown["status"].tolist()
+
+
+def test_a_column_of_the_run_upstream_never_takes_the_name_of_an_own_input(tmp_path):
+    """The column twice_m of the campaign "first" was called first_twice_m, as was an input of the second."""
+    (tmp_path / "factor.py").write_text(SIMULATOR)
+    (tmp_path / "first.toml").write_text(HEAD + DISPERSED)
+    assert call("run", tmp_path / "first.toml", "--out", tmp_path / "first", "--no-report").exit_code == 0
+    (tmp_path / "factor.py").write_text(SIMULATOR.replace("length_m=", 'first_twice_m=Parameter(7.0, "x"), length_m='))
+    (tmp_path / "second.toml").write_text(
+        HEAD + '[inputs]\nfrom = "first"\ncolumns = { length_m = "twice_m" }\n'
+        "[dispersion.first_twice_m]\ndist = 'uniform'\nlower = 1.0\nupper = 2.0\n"
+    )
+    flown = call("run", tmp_path / "second.toml", "--out", tmp_path / "second", "--no-report")
+    assert flown.exit_code == 0, flown.output
+    first, second = (pd.read_parquet(tmp_path / run / "cases") for run in ("first", "second"))
+    assert second["first_2_twice_m"].tolist() == first["twice_m"].tolist()
+    assert second["first_twice_m"].between(1.0, 2.0).all()
