@@ -65,6 +65,8 @@ class CompiledFlyer(Flyer):
 
     def faults_in_flight(self, process: Process) -> list[str]:
         make_kernel_folder()  # or what is wrong with the folder would be told as a fault of the model
+        import scipy.special  # noqa: F401  # `second_look` draws cases with it: loaded while the process starts
+
         return flight_faults(self._campaign, process)
 
     def second_look(self, copies_of: Copies) -> tuple[list[str], list[str]]:
