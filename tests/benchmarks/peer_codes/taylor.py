@@ -1,7 +1,8 @@
 """heyoka's Taylor integrator in its best forms: a batch of as many cases as a register holds, and one at a time.
 
-What makes it fast is on: unrolled code (no compact mode), fast mathematics, one integrator for all flights; events in
-batches are followed by refilling the lane from within the event's callback, so that no lane waits.
+What makes it fast is on: unrolled code (no compact mode), fast mathematics, subnormal numbers flushed to zero, one
+integrator for all flights; events in batches are followed by refilling the lane from within the event's callback, so
+that no lane waits.
 """
 
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import numpy as np
 from mc_engine.flight.kernel import registers
 from tests.benchmarks.peer_codes.entrant import TOLERANCES, Entrant, Flight, portions, shared
 from tests.benchmarks.peer_codes.problems import Problem
+from tests.benchmarks.peer_codes.subnormals import flushed
 
 WIDTH = max(hy.recommended_simd_size(), registers().doubles)  # heyoka recommends half a register of Intel's AVX-512
 
@@ -115,7 +117,7 @@ def _single(problem: Problem, tolerance: float) -> Flight:
 def _entrant(problem: Problem, form: str, one_thread: Callable[[Problem, float], Flight]) -> Entrant:
     def build(cases: Problem, value: float, threads: int) -> Flight:
         parts = [cases.part(where) for where in portions(cases.first.shape[1], threads, WIDTH)]
-        return shared([one_thread(part, value) for part in parts])
+        return shared([flushed()(one_thread(part, value)) for part in parts])
 
     return Entrant("heyoka", form, problem, "tolerance", TOLERANCES, build)
 
