@@ -24,9 +24,11 @@ from mc_engine.command_line.app import (
     write_reports,
 )
 from mc_engine.command_line.next_step import MERGE, after_merge
+from mc_engine.errors import StoreError, UsageError
 from mc_engine.interruption import advise
 from mc_engine.numbers_in_text import counted
 from mc_engine.shell_words import shell_word
+from mc_engine.store.run_files import RARE_EVENT, RUN, TUNING, kind_of
 from mc_engine.store.urls import is_url, store_url
 from mc_engine.suggestions import hint
 
@@ -60,7 +62,6 @@ def report(
 ) -> None:
     """Write the reports of runs, tunings or rare events anew."""
     advise(lambda: f"interrupted; `mc-engine report {' '.join(map(shell_word, folders))}` writes the reports")
-    from mc_engine.store.run_files import RUN, kind_of
 
     for kind in kinds or ():
         if kind not in REPORT_FORMATS:
@@ -87,7 +88,6 @@ def status(place: RunPlace) -> None:
     """Print the progress of a run and the statuses of its cases. For a tuning or a rare event, print its result."""
     from mc_engine.runner.summary import case_line
     from mc_engine.store.case_rows import recorded_cases, rows_so_far
-    from mc_engine.store.run_files import RARE_EVENT, TUNING, kind_of
     from mc_engine.store.writer_lock import described, holder
     from mc_engine.studies.rare_event_folder import open_rare_event, rare_event_lines
     from mc_engine.studies.tuning_folder import open_tuning, tuning_lines
@@ -161,7 +161,6 @@ def summary(
 @exit_status()
 def verify(place: RunPlace) -> None:
     """Verify all checksums of a run, a tuning or a rare event. Reports and replays are included."""
-    from mc_engine.store.run_files import kind_of
     from mc_engine.store.verification import RESUME, damages, remedies
 
     folder = run_at(place)
@@ -241,7 +240,6 @@ def _named_columns(store: "Store", text: str) -> list[str]:
 
 
 def _write_oem(store: "Store", names: list[str], path: Path, epoch: str | None, frame: str | None, centre: str) -> None:
-    from mc_engine.errors import StoreError
     from mc_engine.studies.end_states import write_oem
 
     if len(names) != _OEM_COLUMNS:
@@ -275,7 +273,6 @@ def publish(folder: RunFolder, url: Url) -> None:
 
 def echo_publication(folder: Path, url: str) -> None:
     """Publish the run, and print what was sent."""
-    from mc_engine.errors import StoreError, UsageError
     from mc_engine.store.object_store import publish
 
     try:

@@ -20,11 +20,12 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
+from mc_engine.command_line.next_step import after_merge
 from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError, UsageError
 from mc_engine.interruption import INTERRUPTED, interruption_message, signalled, under_way
 from mc_engine.numbers_in_text import LARGEST_WHOLE, counted, is_real, is_whole
 from mc_engine.shell_words import shell_word
-from mc_engine.store.run_files import JOURNAL, NO_TEXT, kind_of, readable
+from mc_engine.store.run_files import JOURNAL, NO_TEXT, RUN, is_run_directory, kind_of, readable, runs_in
 from mc_engine.store.urls import is_url, store_url
 from mc_engine.unforeseen import UNFORESEEN, unforeseen
 
@@ -198,7 +199,6 @@ def leave(status: int, message: str) -> NoReturn:
 def existing_run(path: Path) -> "Store":
     """The run in `path`.  A path that is no run directory is wrong usage, not damage."""
     from mc_engine.store.opening import open_store
-    from mc_engine.store.run_files import is_run_directory
 
     _refuse_unreadable(path)
     if not is_run_directory(path):
@@ -209,7 +209,6 @@ def existing_run(path: Path) -> "Store":
 def _no_run(path: Path) -> str:
     """Why a path is no run directory, and what to do."""
     from mc_engine.campaign.search import campaign_names
-    from mc_engine.store.run_files import kind_of, runs_in
 
     if kind := kind_of(path):
         return f"holds a {kind} and no run; `mc-engine status {shell_word(path)}` shows what was found"
@@ -243,9 +242,7 @@ def refuse_occupied_folder(path: Path, option: str = "--out ") -> None:
 
     option : what the sentence begins with; empty where the folder is an argument
     """
-    from mc_engine.command_line.next_step import after_merge
     from mc_engine.store.opening import open_store
-    from mc_engine.store.run_files import JOURNAL, RUN, is_run_directory, kind_of
     from mc_engine.store.store import refuse_occupied
     from mc_engine.store.writer_lock import LOCK_NAME
 

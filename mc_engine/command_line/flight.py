@@ -40,6 +40,7 @@ from mc_engine.interruption import NOTHING_BEGUN, advise, raise_if_signalled
 from mc_engine.numbers_in_text import counted
 from mc_engine.shell_words import shell_word
 from mc_engine.status import MOST_CASES
+from mc_engine.store.run_files import default_folder
 
 if TYPE_CHECKING:
     from mc_engine.runner.shards import Shard
@@ -96,7 +97,6 @@ def run(
         return
     advise(lambda: NOTHING_BEGUN)
     from mc_engine.campaign.loading import load_campaign
-    from mc_engine.store.run_files import default_folder
 
     if upstream is not None:
         existing_run(upstream)

@@ -3,6 +3,7 @@
 Read from the journal without numba or pandas, since the signal may have interrupted their import.
 """
 
+import json
 from pathlib import Path
 
 from mc_engine.interruption import NOTHING_BEGUN
@@ -21,8 +22,6 @@ def after_flight(run: Path, options: str = "", url: str | None = None, rerun: bo
     """
     if not (run / JOURNAL).is_file():
         return NOTHING_BEGUN
-    import json  # not for `--help`
-
     events, manifest = _events(run), json.loads((run / MANIFEST).read_bytes())
     if advice := after_merge(run):
         return f"interrupted; {advice}"

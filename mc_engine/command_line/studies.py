@@ -29,7 +29,9 @@ from mc_engine.command_line.app import (
 )
 from mc_engine.command_line.flight import finish
 from mc_engine.command_line.next_step import after_search
+from mc_engine.durable_file import write_durably
 from mc_engine.interruption import NOTHING_BEGUN, advise, in_threads, raise_if_signalled
+from mc_engine.store.run_files import default_folder
 
 if TYPE_CHECKING:
     from mc_engine.campaign.loading import Campaign
@@ -91,7 +93,6 @@ def tune(
     """Search for the parameters with the best metrics. [tuning] of FILE specifies both (needs pymoo)."""
     advise(lambda: NOTHING_BEGUN)
     from mc_engine.campaign.loading import load_campaign
-    from mc_engine.store.run_files import default_folder
 
     campaign = load_campaign(file)
     path = out if out is not None else default_folder(campaign.name)
@@ -136,7 +137,6 @@ def rare(
     """Estimate how probable it is that a requirement is not met. The probability may be down to one in millions."""
     advise(lambda: NOTHING_BEGUN)
     from mc_engine.campaign.loading import load_campaign
-    from mc_engine.store.run_files import default_folder
     from mc_engine.studies.limit_state import chosen_requirement, refuse_unmappable
     from mc_engine.studies.rare_event import METHODS, estimate_rare_event
     from mc_engine.studies.rare_event_folder import rare_event_lines
@@ -256,7 +256,6 @@ def published(
     Without a name: the number of each outcome in the shipped campaigns, and the headline numbers.  Our values are read
     from `published.lock.toml`, unless --compute is given.
     """
-    from mc_engine.durable_file import write_durably
     from mc_engine.studies.published_table import (
         campaign_table,
         headline_table,
