@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.abc import InspectLoader
 from inspect import unwrap
-from types import CodeType, FunctionType
+from types import CellType, CodeType, FunctionType
 from typing import Any
 
 from mc_engine.errors import ModelError
@@ -262,7 +262,7 @@ def _with_stop(function: Any, line: int, is_due: Callable[[str], bool]) -> Any:
     module = ast.fix_missing_locations(ast.Module([outer], []))
     made: CodeType = InspectLoader.source_to_code(module, function.__code__.co_filename)
     code = _code_in(_code_in(made, "outer"), own.name)
-    cells = tuple(_cell(given[name]) for name in code.co_freevars)
+    cells = tuple(CellType(given[name]) for name in code.co_freevars)
     return FunctionType(code, function.__globals__, function.__name__, function.__defaults__, cells)
 
 
@@ -278,7 +278,3 @@ def _position(body: list[ast.stmt], line: int) -> tuple[list[ast.stmt], int]:
 
 def _code_in(code: CodeType, name: str) -> CodeType:
     return next(item for item in code.co_consts if isinstance(item, CodeType) and item.co_name == name)
-
-
-def _cell(value: Any) -> Any:
-    return (lambda: value).__closure__[0]  # type: ignore[index]
