@@ -26,7 +26,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mc_engine.statistics.first_order import first_orders, standardised
-from mc_engine.statistics.input_columns import InputColumn, average_ranks, beyond_chance, finite_rows, input_columns
+from mc_engine.statistics.input_columns import (
+    InputColumn,
+    average_ranks,
+    beyond_chance,
+    finite_rows,
+    input_columns,
+    rank_correlations,
+)
 from mc_engine.statistics.moments import near_one, varying_rows
 from mc_engine.statistics.total_order import FEWEST_CASES as FEWEST_OF_TOTALS
 from mc_engine.statistics.total_order import total_order
@@ -170,12 +177,9 @@ def _regression(columns: np.ndarray, table: np.ndarray) -> _Fit | None:
 
 
 def _strongest_correlation(columns: Sequence[InputColumn], n: int) -> tuple[str, str, float] | None:
-    rows = np.flatnonzero(finite_rows(columns, n)) if columns else np.zeros(0, dtype=np.int64)
-    usable = [part for part in (column.at(rows) for column in columns) if part.ordered and part.varies]
-    if len(usable) < 2 or rows.size < FEWEST_CASES:
+    rows = np.flatnonzero(finite_rows(columns, n))
+    rho = np.triu(rank_correlations([column.at(rows) for column in columns]))
+    if rows.size < FEWEST_CASES or not rho.any():
         return None
-    ranks = standardised(average_ranks(np.column_stack([column.values for column in usable])))
-    rho = ranks.T @ ranks / rows.size
-    np.fill_diagonal(rho, 0.0)
     first, second = np.unravel_index(np.abs(rho).argmax(), rho.shape)
-    return usable[first].name, usable[second].name, float(rho[first, second])
+    return columns[first].name, columns[second].name, float(rho[first, second])
