@@ -156,7 +156,7 @@ def load_campaign(
         name, source = str(reference), Path(str(reference)).name
         directory = path_of(directory or Path.cwd(), "directory: {} is no path")
     document = parse_toml(text, source)
-    written = _campaign_keys(document)
+    written = _table_of(document, "campaign")
     given = {key: value for key, value in (("cases", cases), ("seed", seed)) if value is not None}
     written.update({key: int(value) if isinstance(value, np.integer) else value for key, value in given.items()})
     findings, run = Findings(), None if upstream is None else path_of(upstream, "upstream: {} is no path")
@@ -258,15 +258,15 @@ def _assemble(
     )
 
 
-def _campaign_keys(document: dict[str, Any]) -> dict[str, Any]:
-    """[campaign] as written; empty where it is no table."""
-    section = document.get("campaign")
+def _table_of(document: dict[str, Any], name: str) -> dict[str, Any]:
+    """The table of this name as written; empty where it is no table."""
+    section = document.get(name)
     return section if isinstance(section, dict) else {}
 
 
 def _named_design(document: dict[str, Any]) -> str | None:
     """The design, even where other keys of [campaign] are wrong: dispersions are checked against it."""
-    design = _campaign_keys(document).get("design")
+    design = _table_of(document, "campaign").get("design")
     return design if isinstance(design, str) and design in DESIGNS else None
 
 
@@ -291,14 +291,12 @@ def _unknown_names(
     document: dict[str, Any], sections: Sections, nominal: Mapping[str, Scalar], model: System, findings: Findings
 ) -> None:
     """Note unknown parameters and metrics in sections that have mistakes of their own."""
-    written = document.get("dispersion")
-    for name in written if isinstance(written, dict) else ():
+    for name in _table_of(document, "dispersion"):
         if name not in sections.dispersions and name not in nominal:
             findings.under("dispersion", name).add(
                 "", f"is not a parameter of {model.name}{hint(name, inputs_of(model))}"
             )
-    written = document.get("requirement")
-    for name, raw in written.items() if isinstance(written, dict) else ():
+    for name, raw in _table_of(document, "requirement").items():
         metric = raw.get("metric") if isinstance(raw, dict) else None
         if name not in sections.requirements and isinstance(metric, str):
             check_metric(metric, model, findings.under("requirement", name))
@@ -327,9 +325,7 @@ def _dispersions(
 
 def _faulty_dispersions(document: dict[str, Any], built: tuple[Dispersion, ...]) -> frozenset[str]:
     """The names of dispersions that are in the file and have mistakes of their own, or no known design."""
-    written = document.get("dispersion")
-    names = written if isinstance(written, dict) else ()
-    return frozenset(names) - {dispersion.name for dispersion in built}
+    return frozenset(_table_of(document, "dispersion")) - {dispersion.name for dispersion in built}
 
 
 def _case_count(

@@ -20,7 +20,7 @@ from mc_engine.campaign.sections import (
     RequirementSection,
     RetentionSection,
 )
-from mc_engine.errors import MOST_SHOWN, ModelError
+from mc_engine.errors import ModelError
 from mc_engine.model.faults import naming_faults
 from mc_engine.model.fields import AdaptiveStep, Setting, inputs_of
 from mc_engine.model.fmu import fmu_simulator
@@ -102,7 +102,7 @@ def nominal_values(model: System, overrides: Mapping[str, Scalar], findings: Fin
     inputs = inputs_of(model)
     for name in overrides:
         if name not in inputs:
-            near = hint(name, inputs) if len(findings.problems) < MOST_SHOWN else ""  # a search takes its time
+            near = "" if findings.full else hint(name, inputs)
             findings.add(name, f"is not a parameter of {model.name}{near}")
     values: dict[str, Scalar] = {}
     for item in inputs.values():
