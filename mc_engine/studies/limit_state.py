@@ -105,14 +105,13 @@ def chosen_requirement(campaign: Campaign, name: str | None) -> Requirement:
     names = [requirement.name for requirement in campaign.requirements]
     if not names:
         message = "is missing: a rare event is a requirement not met; add one with a metric and a limit"
-        raise CampaignError(campaign.name, [Problem("requirement", message)])
-    if name is None and len(names) > 1:
+    elif name is None and len(names) > 1:
         message = f"there are several; choose one of {listed(names)}, on the command line by `--requirement`"
-        raise CampaignError(campaign.name, [Problem("requirement", message)])
-    if name is not None and name not in names:
+    elif name is not None and name not in names:
         message = f'"{name}" is not a requirement of this campaign{hint(name, names)}'
-        raise CampaignError(campaign.name, [Problem("requirement", message)])
-    return next(requirement for requirement in campaign.requirements if name in (None, requirement.name))
+    else:
+        return next(requirement for requirement in campaign.requirements if name in (None, requirement.name))
+    raise CampaignError(campaign.name, [Problem("requirement", message)])
 
 
 def refuse_unmappable(campaign: Campaign, requirement: Requirement) -> None:
