@@ -200,11 +200,9 @@ def _is_close(record: Record) -> bool:
     ours, printed = record["ours"], record["published"]
     if isinstance(ours, str) or record.get("statistic") == "farthest":
         return False
-    numbers = [printed] if not isinstance(printed, str) else [record[key] for key in _BOUNDS if key in record]
+    bounds = [record[key] for key in ("at_least", "at_most") if key in record]
+    numbers = bounds if isinstance(printed, str) else [printed]
     return any(abs(ours - number) <= CLOSE_SHARE * abs(number) for number in numbers)
-
-
-_BOUNDS = ("at_least", "at_most")
 
 
 def half_a_unit(number: float) -> float:
