@@ -46,12 +46,12 @@ def campaign_names() -> list[str]:
 
 def campaign_paths(begun: str) -> list[str]:
     """Folders, and .toml files, whose path begins with `begun`; a folder ends in a slash."""
-    folder, _, name = begun.rpartition("/")
+    folder, slash, name = begun.rpartition("/")
+    before = folder + slash
     try:
-        entries = sorted(Path(f"{folder}/" if "/" in begun else ".").iterdir())
+        entries = sorted(Path(before or ".").iterdir())
     except (OSError, ValueError):
         return []
-    before = f"{folder}/" if "/" in begun else ""
     fitting = [entry for entry in entries if entry.name.startswith(name) and (name or not entry.name.startswith("."))]
     return [
         f"{before}{entry.name}{'/' if entry.is_dir() else ''}"
