@@ -72,7 +72,7 @@ def _own_unit(section: DispersionSection, item: Parameter | Setting, findings: F
     unit = options["unit"]
     if unit is not None and unit not in compatible(item.unit):
         quantity = UNITS[item.unit].quantity
-        meaning = "plain numbers" if quantity == "number" else f"{quantity}"
+        meaning = "plain numbers" if quantity == "number" else quantity
         absolute = "; spreads are absolute: convert a percentage of the nominal value" if unit == "%" else ""
         findings.add("unit", f'"{unit}" is not a unit of {meaning}{hint(unit, compatible(item.unit))}{absolute}')
         unit = None

@@ -231,7 +231,7 @@ def _refuse_time(name: str, value: Any, settings: list[str], least: float | None
     """ModelError unless a number of the clock is positive, or at least `least`, or the symbol of a setting."""
     if isinstance(value, str):
         if value not in settings:
-            known = f"{hint(value, settings)}" if settings else "; write a number without quotes"
+            known = hint(value, settings) if settings else "; write a number without quotes"
             raise ModelError(
                 f'the clock\'s `{name}` is "{value}", and no setting has this name without its unit{known}'
             )

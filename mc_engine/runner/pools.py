@@ -28,7 +28,7 @@ from mc_engine.store.parts import Written
 from mc_engine.store.store import Store
 
 _MOST_THREADS = 1024  # a system allows some ten thousand; more than its cores gain nothing
-THREADS_INSIDE = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+THREADS_INSIDE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 def pool_of(
