@@ -44,3 +44,5 @@ STATUS_TEXT = {
     MEMORY_LIMIT: "the simulator needed more memory than it was allowed to have",
     NO_RESULT: "the simulator's output is missing, unreadable or incomplete; the column `reason` says what is wrong",
 }
+
+STATUS_MEANING = {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()}  # by the word

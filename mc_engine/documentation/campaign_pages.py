@@ -9,7 +9,7 @@ import numpy as np
 from mc_engine.campaign.search import SHIPPED, ShippedCampaign, campaign_section, list_campaigns
 from mc_engine.documentation.markdown_text import code, escaped, table
 from mc_engine.model import AdaptiveStep, Event, Model, Named, Parameter, Setting, load_model
-from mc_engine.status import STATUS_NAME, STATUS_TEXT
+from mc_engine.status import STATUS_MEANING
 from mc_engine.studies.published_table import campaign_table
 
 _COLUMNS = """# Columns of a run
@@ -34,7 +34,7 @@ field, and in `Store.units`. The nominal case is kept apart, in `nominal.parquet
 
 def pages() -> Iterator[tuple[str, str]]:
     """A page for what all runs have in common, and one a model."""
-    statuses = [(code(name), escaped(STATUS_TEXT[key])) for key, name in STATUS_NAME.items()]
+    statuses = [(code(name), escaped(text)) for name, text in STATUS_MEANING.items()]
     groups = {
         name: list(files) for name, files in groupby(list_campaigns(), lambda campaign: campaign.path.parent.name)
     }

@@ -18,7 +18,7 @@ from mc_engine.model.figures import to_record
 from mc_engine.model.record import Model
 from mc_engine.model.simulator import System
 from mc_engine.sampling.streams import SEED_CONTRACT
-from mc_engine.status import STATUS_NAME, STATUS_TEXT
+from mc_engine.status import STATUS_MEANING
 from mc_engine.store.journal import utc_now
 from mc_engine.store.parts import Column
 
@@ -78,7 +78,7 @@ def manifest_of(campaign: Campaign) -> dict[str, Any]:
         "figures": [*(to_record(figure) for figure in model.figures), *_upstream_figures(campaign)],
         "published": [dict(record) for record in model.published],
         "upstream": _upstream_facts(campaign),
-        "status_texts": {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()},
+        "status_texts": dict(STATUS_MEANING),
         "provenance": environment(),
     }
 

@@ -16,9 +16,7 @@ from mc_engine.campaign.tuning_section import Constraint, Tuning
 from mc_engine.flight.chunks import NOMINAL_NOISE, fly_in_threads
 from mc_engine.model.faults import naming_faults
 from mc_engine.sampling.distributions import column
-from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
-
-_MEANING = {name: STATUS_TEXT[code] for code, name in STATUS_NAME.items()}
+from mc_engine.status import OK, STATUS_MEANING, STATUS_NAME
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,7 @@ def commonest_failure(status: Iterable[str], reason: Iterable[str]) -> str:
     status, reason : of each failed case; without a reason, the meaning of the status is used.  Of equally common ones,
         the first.
     """
-    ends = Counter(f"{how}: {why or _MEANING[how]}" for how, why in zip(status, reason, strict=True))
+    ends = Counter(f"{how}: {why or STATUS_MEANING[how]}" for how, why in zip(status, reason, strict=True))
     return ends.most_common(1)[0][0] if ends else ""
 
 

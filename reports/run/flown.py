@@ -16,7 +16,7 @@ from mc_engine.section import ReportSection
 from mc_engine.statistics import CHOSEN_DESIGNS, SAMPLING_DESIGNS, Summary, Verdict, summarize, was_looked_at
 from mc_engine.statistics.first_order import Contributor, contributors, ranked_by_change
 from mc_engine.statistics.worst import Limits, limits_on
-from mc_engine.status import STATUS_NAME, STATUS_TEXT
+from mc_engine.status import STATUS_MEANING
 from mc_engine.store.store import Store
 from reports.run.all_cases import all_cases, without_attributes
 from reports.run.contributions import Contributions
@@ -394,6 +394,5 @@ class Flown:
 
     def status_text(self, status: str) -> str:
         """The sentence behind a status word: the run's own, or this engine's; what is code there stands in quotes."""
-        texts = {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()}
-        text = str({**texts, **self.manifest.get("status_texts", {})}.get(status, ""))
+        text = str({**STATUS_MEANING, **self.manifest.get("status_texts", {})}.get(status, ""))
         return re.sub("`([^`]*)`", r"“\1”", text)
