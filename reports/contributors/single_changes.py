@@ -130,7 +130,7 @@ def _table(flown: Flown, told: dict[str, list[SingleChanges]]) -> Table:
     )
     rows, left_out = [], 0
     for metric, changes in told.items():
-        title = Cell(axis_label(flown.words(metric), flown.unit(metric)))
+        title = Cell(flown.label(metric))
         left_out += len(changes[MOST_INPUTS:])
         for row in changes[:MOST_INPUTS]:
             used = f"{count(int(row.known.sum()))}/{count(row.known.size)}"

@@ -157,12 +157,14 @@ class Flown:
         Without the meaning if a state or output has the same name: the initial position is not the position in flight.
         """
         # Of the inputs' own records: the columns of a run upstream have its name before their meaning.
-        meanings = {
-            str(record["name"]): str(record.get("description", "")) for record in self.manifest.get("inputs", [])
-        }
-        for record in self.manifest.get("quantities", []):
-            meanings.pop(str(record["name"]), None)
+        inputs, outputs = (self.manifest.get(key, []) for key in ("inputs", "quantities"))
+        meanings = {str(record["name"]): str(record.get("description", "")) for record in inputs}
+        meanings |= {str(record["name"]): "" for record in outputs}
         return axis_label(named(self.words(name), meanings.get(name, "")), self.unit(name))
+
+    def label(self, name: str) -> str:
+        """The column's name in words with its unit."""
+        return axis_label(self.words(name), self.unit(name))
 
     @property
     def fixed(self) -> list[Mapping[str, Any]]:

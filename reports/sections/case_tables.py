@@ -26,17 +26,16 @@ def case_table(flown: Flown) -> Table | None:
     if not 0 < flown.n_tried <= FEW_CASES:
         return None
     inputs = varying_inputs(flown)[:INPUTS_SHOWN]
-    metrics = [flown.columns[name] for name in flown.key_metrics[:METRICS_SHOWN]]
+    metrics = flown.key_metrics[:METRICS_SHOWN]
     columns = (
         Column("Case", "number"),
-        *(Column(axis_label(flown.words(fact.name), fact.unit), "number") for fact in inputs),
-        *(Column(axis_label(flown.words(fact.name), fact.unit), "number") for fact in metrics),
+        *(Column(flown.label(name), "number") for name in [*(fact.name for fact in inputs), *metrics]),
         Column("Status", "code"),
     )
     cells = [
         [Cell(str(case), int(case), case=int(case)) for case in flown.case_ids],
         *(_input_cells(flown.cases[fact.name]) for fact in inputs),
-        *(_number_cells(flown.values(fact.name)) for fact in metrics),
+        *(_number_cells(flown.values(name)) for name in metrics),
         [Cell(str(word)) for word in flown.cases["status"]],
     ]
     rows = tuple(zip(*cells, strict=True))
@@ -97,7 +96,7 @@ def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFr
     given = {name: values for name, values in flown.inputs.items() if metric or cases[name].notna().any()}
     ranked = flown.contributors(metric) if metric else contributors(given, inside_of, flown.design == "sobol")
     ranked = ranked or [Contributor(name, np.nan) for name in flown.inputs]
-    shown = [flown.columns[contributor.name] for contributor in ranked[:INPUTS_SHOWN]]
+    shown = [contributor.name for contributor in ranked[:INPUTS_SHOWN]]
     columns = [Column("Case", "number")]
     cells = [[Cell(count(int(case)), int(case), case=int(case)) for case in cases["case_id"]]]
     if metric is None:
@@ -105,14 +104,14 @@ def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFr
         cells.append([Cell(str(word)) for word in cases["status"]])
     else:
         values, limits = cases[metric].to_numpy(dtype=np.float64), flown.limits(metric)
-        columns.append(Column(axis_label(flown.words(metric), flown.unit(metric)), "number"))
+        columns.append(Column(flown.label(metric), "number"))
         cells.append(_cells_beside(values, [end for end in limits if end is not None]))
         if limits != Limits():
             columns.append(Column(axis_label("Margin", flown.unit(metric)), "number"))
             cells.append(_cells_beside(limits.margins(values) * limits.reach, [0.0]))
-    for fact in shown:
-        columns.append(Column(axis_label(flown.words(fact.name), fact.unit), "number"))
-        cells.append(_input_cells(cases[fact.name]))
+    for name in shown:
+        columns.append(Column(flown.label(name), "number"))
+        cells.append(_input_cells(cases[name]))
     if not flown.manifest.get("imported"):  # such cases cannot be flown again
         columns.append(Column("Command to replay, in the run’s folder", "code"))
         cells.append([Cell(f"mc-engine replay . {case}") for case in cases["case_id"]])

@@ -12,7 +12,7 @@ from reports.drawing.marks import Drawing, Plot
 from reports.figures.rows import SPREAD, level_panel
 from reports.run.flown import Flown
 from reports.sections.tables import quantile_cell, used_cell
-from reports.text.numbers import axis_label, count, given_percent, interval, number, percent
+from reports.text.numbers import count, given_percent, interval, number, percent
 
 MOST_LEVELS = 20
 MOST_METRICS = 8
@@ -88,7 +88,7 @@ def _metric_panel(flown: Flown, metric: str, levels: list[str], rows: list[np.nd
         used.append(int(numbers.size))
         if numbers.size:
             quantiles[place] = np.quantile(numbers, SPREAD)
-    return level_panel(axis_label(flown.words(metric), flown.unit(metric)), levels, quantiles, used)
+    return level_panel(flown.label(metric), levels, quantiles, used)
 
 
 def _level_table(
@@ -118,7 +118,7 @@ def _level_table(
         end = Cell(number(worst, 4, summary.spread), worst)
         against = _difference_cells(flown, values, matched, place)
         body.append((Cell(level), used_cell(summary), *cells, end, *against))
-    title = f"{axis_label(flown.words(metric), flown.unit(metric))} by {flown.words(name)}{flown.sample_words}"
+    title = f"{flown.label(metric)} by {flown.words(name)}{flown.sample_words}"
     return Table(
         title[:1].upper() + title[1:], columns, tuple(body), _pairing_note(flown, levels[0], bool(len(matched)))
     )

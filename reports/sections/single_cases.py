@@ -102,7 +102,7 @@ def case_data(flown: Flown, sections: Iterable[Section]) -> CaseData | None:
         columns=tuple(_column(flown, fact, rows) for fact in facts) + tuple(_place_columns(flown, sections, rows)),
         axes=case_axes(flown),
         time=axis_label("time", flown.unit("t_s")),
-        quantities={name: axis_label(flown.words(name), flown.unit(name)) for name in _quantities(flown, histories)},
+        quantities={name: flown.label(name) for name in _quantities(flown, histories)},
         histories=histories,
     )
 
@@ -122,7 +122,7 @@ def _shown_columns(flown: Flown, most: int) -> list[ColumnFacts]:
 
 def _column(flown: Flown, fact: ColumnFacts, rows: np.ndarray) -> CaseColumn:
     values = flown.cases[fact.name].iloc[rows]
-    label = axis_label(flown.words(fact.name), fact.unit)
+    label = flown.label(fact.name)
     if is_switch(flown, fact.name):
         return CaseColumn(fact.name, label, fact.role, tuple(map(exact, values.tolist())))
     if not pd.api.types.is_numeric_dtype(values):

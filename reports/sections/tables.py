@@ -1,4 +1,4 @@
-"""The tables of results: verdicts, summaries, quantiles, published values, statuses, worst cases."""
+"""The tables of results and inputs: summaries, ranges, quantiles, statuses, fixed values, dispersed inputs."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -113,7 +113,7 @@ def _end_cell(flown: Flown, name: str, summary: Summary, value: float | None) ->
 
 def metric_cell(flown: Flown, name: str) -> Cell:
     """A metric with its unit; below, its meaning, or its column's name."""
-    return Cell(axis_label(flown.words(name), flown.unit(name)), small=flown.columns[name].description or name)
+    return Cell(flown.label(name), small=flown.columns[name].description or name)
 
 
 def used_cell(summary: Summary) -> Cell:
@@ -152,7 +152,7 @@ def quantile_table(flown: Flown) -> Table | None:
     rows = []
     for name, summary in drawn.items():
         cells = [quantile_cell(flown, item, summary.spread) for item in summary.quantiles if item.probability in shown]
-        rows.append((Cell(axis_label(flown.words(name), flown.unit(name))), used_cell(summary), *cells))
+        rows.append((Cell(flown.label(name)), used_cell(summary), *cells))
     each = given_percent(flown.stated.confidence)
     note = (
         f"In brackets: distribution-free limits from order statistics, each holding with {each}{_for_fixed(flown)}; "
