@@ -140,13 +140,14 @@ def summary(
     from mc_engine.runner.summary import analyses_line, summaries, summary_lines
     from mc_engine.section import ReportSection
     from mc_engine.statistics import SAMPLING_DESIGNS
+    from mc_engine.store.manifest_file import design_in
 
     store = existing_run(run_at(place))
     known = [column.name for column in store.columns if column.role == "metric"]
     for name in metric or ():
         if name not in known:
             leave(USAGE, f'--metric "{name}" is no metric of this run; it has {", ".join(known) or "none"}')
-    random = store.manifest["campaign"].get("design", "mc") in SAMPLING_DESIGNS
+    random = design_in(store.manifest) in SAMPLING_DESIGNS
     for name, statistics in summaries(store, metric or None).items():
         typer.echo("\n".join(summary_lines(name, statistics, store.units[name], random)))
     if random:

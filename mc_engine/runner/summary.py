@@ -10,7 +10,7 @@ from mc_engine.numbers_in_text import decimals_of, outward, percent_digits
 from mc_engine.section import ReportSection
 from mc_engine.shell_words import shell_word
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
-from mc_engine.store.manifest_file import seed_remark
+from mc_engine.store.manifest_file import design_in, seed_remark
 from mc_engine.store.parts import CASE_COLUMNS, Column, Part, numbers_in, read_part, rows_with
 from mc_engine.store.run_files import NO_NOMINAL
 from mc_engine.store.store import Store
@@ -108,15 +108,11 @@ def outcomes(store: Store) -> "tuple[list[Verdict], Verdict | None]":
     counts = LimitCounts(requirements)
     for table, numbers in metric_parts(store, _judged_metrics(requirements)):
         counts.add(numbers.__getitem__, np.ones(table.num_rows, dtype=bool))
-    return judge_counted(counts, None, _design(store), _looked(store))
+    return judge_counted(counts, None, design_in(store.manifest), _looked(store))
 
 
 def _judged_metrics(requirements: Sequence[Mapping[str, Any]]) -> list[str]:
     return list(dict.fromkeys(str(record["metric"]) for record in requirements))
-
-
-def _design(store: Store) -> str:
-    return str(store.manifest["campaign"].get("design", "mc"))
 
 
 def _flown(store: Store) -> int:
@@ -224,7 +220,7 @@ def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, 
     from mc_engine.statistics import CHOSEN_DESIGNS, QUANTILES
 
     stated = ReportSection(**store.manifest.get("report", {}))
-    probabilities = () if _design(store) in CHOSEN_DESIGNS else tuple(sorted({*QUANTILES, *stated.outer}))
+    probabilities = () if design_in(store.manifest) in CHOSEN_DESIGNS else tuple(sorted({*QUANTILES, *stated.outer}))
     return streamed(store, names, probabilities=probabilities, confidence=stated.two_sided).summaries
 
 
@@ -247,7 +243,7 @@ def streamed(
         passes or (lambda names: (numbers for _, numbers in metric_parts(store, names))),
         metrics,
         requirements=requirements,
-        design=_design(store),
+        design=design_in(store.manifest),
         looked=_looked(store),
         chained=bool(store.manifest.get("upstream")),
         probabilities=QUANTILES if probabilities is None else probabilities,

@@ -273,6 +273,16 @@ def checked_record(content: bytes | str, kind: type[_Kind], newest: int) -> tupl
     return dict(record), checked
 
 
+def title_in(manifest: Mapping[str, Any]) -> str:
+    """The title of the campaign, or else its name."""
+    return str(manifest["campaign"].get("title") or manifest["campaign"].get("name", ""))
+
+
+def design_in(manifest: Mapping[str, Any]) -> str:
+    """The design of the campaign."""
+    return str(manifest.get("campaign", {}).get("design", "mc"))
+
+
 def cases_in(manifest: dict[str, Any], n_cases: int) -> range:
     """The cases that the directory of a run of `n_cases` holds: all, or those of its shard."""
     shard = manifest.get("shard")

@@ -37,6 +37,7 @@ from mc_engine.statistics.requirements import (
     was_looked_at,
 )
 from mc_engine.status import OK, STATUS_NAME
+from mc_engine.store.manifest_file import design_in, title_in
 from mc_engine.store.store import Store
 from mc_engine.studies.run_changes import Difference, campaign_diff, campaign_differences, code_differences
 
@@ -234,11 +235,9 @@ def compare_runs(
     adjusted = iter(holm(_p_values(changes, shares)).tolist())
     return Comparison(
         names=names,
-        titles=_both(
-            manifests, lambda manifest: str(manifest["campaign"].get("title") or manifest["campaign"].get("name", ""))
-        ),
+        titles=_both(manifests, title_in),
         created=_both(manifests, lambda manifest: str(manifest.get("created_utc", ""))),
-        designs=_both(manifests, _design),
+        designs=_both(manifests, design_in),
         cases=_both(tables, len),
         ok=_both(ok, lambda flown: int(flown.sum())),
         wanted=wanted,
@@ -349,12 +348,8 @@ def _judged(manifest: Mapping[str, Any], table: pd.DataFrame, flown: np.ndarray,
     """The verdicts of a run by the names of its requirements, the joint one among them."""
     records = manifest.get("requirements", [])
     columns = {record["metric"]: table[record["metric"]].to_numpy(dtype=np.float64) for record in records}
-    judged, joint = judge_all(records, columns.__getitem__, flown, _design(manifest), looked)
+    judged, joint = judge_all(records, columns.__getitem__, flown, design_in(manifest), looked)
     return {verdict.name: verdict for verdict in [*judged, *([joint] if joint else [])]}
-
-
-def _design(manifest: Mapping[str, Any]) -> str:
-    return str(manifest["campaign"].get("design", "mc"))
 
 
 def _verdict_on(name: str, judged: Mapping[str, Verdict]) -> Verdict | None:

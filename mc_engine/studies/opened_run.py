@@ -24,6 +24,7 @@ from mc_engine.model.simulator import Simulator
 from mc_engine.runner.summary import case_line, judgement, summaries, verdict_line
 from mc_engine.shell_words import shell_word
 from mc_engine.status import REFUSED, STATUS_NAME
+from mc_engine.store.manifest_file import title_in
 from mc_engine.store.opening import open_store
 from mc_engine.store.run_files import NOMINAL_CASE
 from mc_engine.store.store import Store
@@ -92,8 +93,7 @@ class Run:
     @property
     def title(self) -> str:
         """The campaign's title, or else its name."""
-        campaign = self.store.manifest["campaign"]
-        return str(campaign.get("title") or campaign.get("name", ""))
+        return title_in(self.store.manifest)
 
     @cached_property
     def cases(self) -> pd.DataFrame:

@@ -25,6 +25,7 @@ from mc_engine.statistics.limits import LimitCounts
 from mc_engine.statistics.picked_cases import picked_rows
 from mc_engine.statistics.worst import Limits, WorstSoFar, limits_on
 from mc_engine.status import OK, STATUS_NAME
+from mc_engine.store.manifest_file import design_in
 from mc_engine.store.store import Part, Store
 
 MOST_CELLS = 1 << 24  # of a table that is held
@@ -108,9 +109,8 @@ class HeldCases:
     def judgement(self) -> tuple[list[Verdict], Verdict | None]:
         """A verdict per requirement, and the one on all at once."""
         looked = was_looked_at(self.manifest, self.n_wanted, self.n_tried)
-        design = str(self.manifest.get("campaign", {}).get("design", "mc"))
         chained = bool(self.manifest.get("upstream"))
-        return judge_all(self.requirements, self.values, self.ok, design, looked, chained)
+        return judge_all(self.requirements, self.values, self.ok, design_in(self.manifest), looked, chained)
 
     @cached_property
     def summaries(self) -> dict[str, Summary]:
