@@ -22,10 +22,15 @@ class Limits(NamedTuple):
         return self.at_most is not None and self.at_least is not None
 
     @property
+    def ends(self) -> list[float]:
+        """The limits that are set, the lower one first."""
+        return [end for end in (self.at_least, self.at_most) if end is not None]
+
+    @property
     def reach(self) -> float:
         """The unit of margins: half the distance between two limits, the size of a single one, 1 for a limit of 0."""
-        ends = [end for end in self if end is not None]
-        return abs(0.5 * (ends[0] - ends[-1]) if len(ends) > 1 else ends[0]) or 1.0 if ends else 1.0
+        ends = self.ends or [1.0]
+        return abs(0.5 * (ends[0] - ends[1]) if self.two_sided else ends[0]) or 1.0
 
     def distances(self, values: np.ndarray) -> np.ndarray:
         """float64[n]: how far the values are inside the nearest limit, negative outside; infinite without a limit."""

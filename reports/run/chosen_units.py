@@ -112,7 +112,7 @@ class ShownRun(Flown):
         if summary is None or not summary.spread or summary.mean is None:
             return False
         chosen = self._chosen(name, unit)
-        apart = [abs(limit - summary.mean) for limit in self._own.limits(name) if limit is not None]
+        apart = [abs(limit - summary.mean) for limit in self._own.limits(name).ends]
         return chosen != unit and convert(max([summary.spread, *apart]), unit, chosen) < FINE
 
     def _sizes(self, name: str) -> list[list[float | None]]:

@@ -81,8 +81,7 @@ def _worst_words(flown: Flown, metric: str) -> str:
     limits = flown.limits(metric)
     if not limits.two_sided:
         return f"Cases with the {'smallest' if limits.at_least is not None else 'largest'} {flown.words(metric)}"
-    both = [end for end in (limits.at_least, limits.at_most) if end is not None]
-    ends = [with_unit(limit_number(end), flown.unit(metric)) for end in both]
+    ends = [with_unit(limit_number(end), flown.unit(metric)) for end in limits.ends]
     return f"Cases with the smallest margin of {flown.words(metric)} to its limits, {ends[0]} and {ends[1]}"
 
 
@@ -105,7 +104,7 @@ def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFr
     else:
         values, limits = cases[metric].to_numpy(dtype=np.float64), flown.limits(metric)
         columns.append(Column(flown.label(metric), "number"))
-        cells.append(_cells_beside(values, [end for end in limits if end is not None]))
+        cells.append(_cells_beside(values, limits.ends))
         if limits != Limits():
             columns.append(Column(axis_label("Margin", flown.unit(metric)), "number"))
             cells.append(_cells_beside(limits.margins(values) * limits.reach, [0.0]))

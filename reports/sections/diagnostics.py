@@ -79,8 +79,6 @@ def normal_probability_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     for name in names:
         values = flown.values(name)
         order = np.argsort(values, kind="stable")[: np.count_nonzero(np.isfinite(values))]
-        limits = flown.limits(name)
-        drawn = tuple(at for at in (limits.at_least, limits.at_most) if at is not None)
         panels.append(
             probability_plot(
                 values[order],
@@ -88,7 +86,7 @@ def normal_probability_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
                 flown.axis(name),
                 _shape(values[order]),
                 flown.stated.confidence,
-                drawn,
+                flown.limits(name).ends,
                 name,
             )
         )

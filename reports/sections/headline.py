@@ -138,8 +138,7 @@ def _tails(flown: Flown, summary: Summary) -> Iterator[str]:
 def _against(limits: Limits, unit: str) -> str:
     """The limits behind a result: limits ±5 s, limits 24 to 55 m, or limit 2.5 kg; nothing without one."""
     if limits.at_most is None or limits.at_least is None:
-        single = [end for end in limits if end is not None]
-        return f", limit {with_unit(limit_number(single[0]), unit)}" if single else ""
+        return f", limit {with_unit(limit_number(limits.ends[0]), unit)}" if limits.ends else ""
     if limits.at_least == -limits.at_most:
         return f", limits ±{with_unit(limit_number(limits.at_most), unit)}"
     return f", limits {limit_number(limits.at_least)} to {with_unit(limit_number(limits.at_most), unit)}"
