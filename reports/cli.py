@@ -38,12 +38,7 @@ def _markdown(document: Document) -> Rendering:
     return lambda: [Attachment(FILE, render_markdown(document)), *figure_files(document)]
 
 
-FORMATS: dict[str, Callable[[Document], Rendering]] = {
-    "html": _html,
-    "pdf": _pdf,
-    "md": _markdown,
-    "json": _json,
-}
+FORMATS: dict[str, Callable[[Document], Rendering]] = {"html": _html, "pdf": _pdf, "md": _markdown, "json": _json}
 USUAL = ("html", "pdf")
 
 

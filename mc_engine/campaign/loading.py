@@ -200,7 +200,8 @@ def _assemble(
     _unknown_names(document, sections, nominal, model, findings)
     check_taken(sections, upstream, design, findings)
     dispersions = _dispersions(sections, model, nominal, design, directory, findings)
-    faulty = _faulty_dispersions(document, dispersions)
+    # in the file, with mistakes of their own, or without a known design
+    faulty = frozenset(_table_of(document, "dispersion")) - {dispersion.name for dispersion in dispersions}
     correlations = check_correlations(sections.correlations, dispersions, faulty, model, design or "mc", findings)
     table_path: Path | None = None
     table: dict[str, np.ndarray] = {}
@@ -321,11 +322,6 @@ def _dispersions(
                 build_dispersion(name, section, model.input(name), nominal[name], design, directory, section_findings)
             )
     return tuple(built)
-
-
-def _faulty_dispersions(document: dict[str, Any], built: tuple[Dispersion, ...]) -> frozenset[str]:
-    """The names of dispersions that are in the file and have mistakes of their own, or no known design."""
-    return frozenset(_table_of(document, "dispersion")) - {dispersion.name for dispersion in built}
 
 
 def _case_count(

@@ -48,17 +48,13 @@ def _vehicle(flown: Flown) -> str:
     nominal = ", and one nominal case with all inputs at their nominal values"
     if flown.nominal.get("reason") == NO_NOMINAL:
         nominal = ""
-    design = f"the design “{flown.design}”{_design_words(flown)}"
+    design = f"the design “{flown.design}”" + (f" ({DESIGNS[flown.design]})" if flown.design in DESIGNS else "")
     said.append(f"{counted(flown.n_wanted, 'case')} of {design} with {dispersed}{nominal}.")
     if upstream:
         said.append(f"Each case continues a case of the run of {upstream['name']}.")
         alike = seed_remark(flown.manifest["campaign"].get("seed"), upstream)
         said.append(f"The seed {alike}." if alike else "")
     return " ".join(filter(None, said))
-
-
-def _design_words(flown: Flown) -> str:
-    return f" ({DESIGNS[flown.design]})" if flown.design in DESIGNS else ""
 
 
 def correlation_table(flown: Flown) -> Table | None:

@@ -96,12 +96,10 @@ def _flat(token: Token) -> str:
     parts: list[str] = []
     address = ""
     for child in token.children or ():
-        if child.type in ("text", "code_inline", "html_inline"):
+        if child.type in ("text", "code_inline", "html_inline", "image"):
             parts.append(child.content)
         elif child.type in ("softbreak", "hardbreak"):
             parts.append(" ")
-        elif child.type == "image":
-            parts.append(child.content)
         elif child.type == "link_open":
             address = str(child.attrs.get("href", ""))
         elif child.type == "link_close" and "".join(parts[-1:]) != address:
