@@ -24,7 +24,7 @@ from mc_engine.campaign.search import campaign_name, campaign_section, find_camp
 from mc_engine.command_line.app import USAGE, leave, refuse_unwritable_folder, write_reports
 from mc_engine.durable_file import make_folder, write_durably
 from mc_engine.interruption import advise, unsignalled_children
-from mc_engine.store.run_files import JOURNAL
+from mc_engine.store.run_files import JOURNAL, stem_of
 
 CASES = 200  # of each flight, unless told otherwise
 _NOTE = re.compile(r"preparing; |[0-9,]+ (further cases are flown|of [0-9,]+ cases)")  # on how far a flight is
@@ -91,7 +91,7 @@ def watch_campaign(reference: str, folder: Path | None, context: typer.Context) 
     arguments = [reference, *(word for option in options.items() for word in option)]
     if folder is not None:
         refuse_unwritable_folder(folder)
-    page = _Page(folder or Path("runs", re.sub(r"[^\w.-]+", "-", name) + "-watch"), name)
+    page = _Page(folder or Path("runs", f"{stem_of(name)}-watch"), name)
     advise(lambda: f"no longer watched; the latest results stay in {page.path}")
     typer.echo(f"page         {page.path}")
     typer.echo(f"watching     {file} and the files beside it and its model; Ctrl-C ends it")

@@ -4,7 +4,6 @@ A worker draws, flies and writes a chunk of cases; the calling process commits i
 campaign, sources, seed and case_id, and not on chunks, workers or backend.
 """
 
-import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -33,7 +32,7 @@ from mc_engine.status import CRASHED, STATUS_NAME
 from mc_engine.store.opening import open_store
 from mc_engine.store.parts import PART_FOLDERS
 from mc_engine.store.repair import mend_journal
-from mc_engine.store.run_files import CAMPAIGN, JOURNAL, MANIFEST, NOMINAL, SIMULATOR, default_folder, path_of
+from mc_engine.store.run_files import CAMPAIGN, JOURNAL, MANIFEST, NOMINAL, SIMULATOR, default_folder, path_of, stem_of
 from mc_engine.store.store import Store, create_store
 from mc_engine.store.urls import is_url
 from mc_engine.store.writer_lock import LOCK_FILES
@@ -138,8 +137,7 @@ def _after_first(campaign: Campaign, path: Path, session: Session) -> Campaign:
     """The campaign with its upstream run, which is first made or completed next to `path` if necessary."""
     if campaign.first is None:
         return campaign
-    name = re.sub(r"[^\w.-]+", "-", campaign.first.name)
-    beside = path.with_name(f"{path.name}-{name}")
+    beside = path.with_name(f"{path.name}-{stem_of(campaign.first.name)}")
     if (beside / JOURNAL).exists():
         store = open_store(beside)
         complete(store, campaign_of(store), session)

@@ -55,10 +55,14 @@ def readable(name: str) -> str:
     return os.fsencode(name).decode("utf-8", "replace")
 
 
+def stem_of(campaign_name: str) -> str:
+    """A campaign's name as a part of a folder's name."""
+    return re.sub(r"[^\w.-]+", "-", campaign_name)
+
+
 def default_folder(campaign_name: str) -> Path:
     """`runs/<campaign>-<UTC time>`, a folder that does not exist."""
-    stem = re.sub(r"[^\w.-]+", "-", campaign_name)
-    path = Path("runs") / f"{stem}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
+    path = Path("runs") / f"{stem_of(campaign_name)}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     return path if not path.exists() else path.with_name(f"{path.name}-{datetime.now(UTC):%f}")
 
 
