@@ -7,6 +7,7 @@ import numpy as np
 from mc_engine.model.figures import HistoryFigure, ProfileFigure, ScatterFigure
 from reports.run.flown import Flown
 from reports.run.phases import quantity_names
+from reports.text.numbers import capitalised
 
 MOST_SCATTERS = 4
 
@@ -40,5 +41,5 @@ def _suggested(flown: Flown) -> Iterator[ScatterFigure]:
             if np.isfinite(flown.values(name)).any():
                 what = "its strongest contributor, " if name in strongest else ""
                 title = f"{flown.words(metric)} over {what}{flown.words(name)}"
-                yield ScatterFigure(name, metric, title[:1].upper() + title[1:])
+                yield ScatterFigure(name, metric, capitalised(title))
                 break

@@ -18,7 +18,7 @@ from reports.run.flown import URGENCY, Flown
 from reports.sections.convergence import MUCH
 from reports.sections.requirement_tables import demonstrated_text
 from reports.sections.tables import TONES, limit_text
-from reports.text.numbers import count, given_percent, limit_number, number, percent, percentile, with_unit
+from reports.text.numbers import capitalised, count, given_percent, limit_number, number, percent, percentile, with_unit
 
 MOST_COSTS = 4
 NEAR_A_TURN = 0.95  # of a full turn, between the smallest and the largest angle
@@ -176,7 +176,7 @@ def warnings(flown: Flown) -> tuple[str, ...]:
         sentences.append(f"{count(failed)} of {count(flown.n_tried)} cases failed; {consequence}.")
     status, reason = (str(flown.nominal.get(name) or "") for name in ("status", "reason"))
     if reason == NO_NOMINAL:
-        sentences.append(f"{reason.capitalize()}.")
+        sentences.append(f"{capitalised(reason)}.")
     elif status not in ("", STATUS_NAME[OK]):
         sentences.append(
             f"The nominal case failed with the status {status}{f', {reason}' if reason else ''}: it has no metrics."

@@ -12,7 +12,7 @@ from reports.drawing.marks import Drawing, Plot
 from reports.figures.rows import SPREAD, level_panel
 from reports.run.flown import Flown
 from reports.sections.tables import quantile_cell, used_cell
-from reports.text.numbers import count, given_percent, interval, number, percent
+from reports.text.numbers import capitalised, count, given_percent, interval, number, percent
 
 MOST_LEVELS = 20
 MOST_METRICS = 8
@@ -119,9 +119,7 @@ def _level_table(
         against = _difference_cells(flown, values, matched, place)
         body.append((Cell(level), used_cell(summary), *cells, end, *against))
     title = f"{flown.label(metric)} by {flown.words(name)}{flown.sample_words}"
-    return Table(
-        title[:1].upper() + title[1:], columns, tuple(body), _pairing_note(flown, levels[0], bool(len(matched)))
-    )
+    return Table(capitalised(title), columns, tuple(body), _pairing_note(flown, levels[0], bool(len(matched))))
 
 
 def _difference_cells(flown: Flown, values: np.ndarray, matched: np.ndarray, place: int) -> tuple[Cell, Cell]:

@@ -11,7 +11,7 @@ from reports.run.chosen_units import chosen_unit, spread_text
 from reports.run.flown import Flown
 from reports.run.phases import phase_times
 from reports.sections.tables import fixed_table, input_table
-from reports.text.numbers import counted, number, with_unit
+from reports.text.numbers import capitalised, counted, number, with_unit
 from reports.text.source_places import of_source
 
 EVENTS = ("time of ", "start of ", "end of ")  # how the meaning of an event's time begins
@@ -94,7 +94,7 @@ def timeline_table(flown: Flown) -> Table | None:
         spread = _range_text(flown, name, summary) if flown.chosen else _sigma_text(flown, name, summary)
         rows.append(
             (
-                Cell(event[:1].upper() + event[1:], small=flown.columns[name].description),
+                Cell(capitalised(event), small=flown.columns[name].description),
                 Cell(
                     with_unit(number(flown.nominal_value(name), 5), flown.unit(name)),
                     _seconds(flown, name),

@@ -36,6 +36,7 @@ from reports.studies.comparison_overlays import overlay_blocks
 from reports.text.numbers import (
     SPACE,
     axis_label,
+    capitalised,
     count,
     counted,
     fixed,
@@ -157,7 +158,7 @@ def _run_facts(comparison: Comparison) -> tuple[tuple[str, str], ...]:
         of = f"{count(cases)} of {counted(wanted, 'case')}" if cases < wanted else counted(cases, "case")
         flown = f"{of}, {count(ok)} completed"
         facts.append((f"Run {letter}", f"{name}: {flown}, {created[:16].replace('T', ' ')}".rstrip(", ")))
-    return (*facts, ("Cases", f"{reason[:1].upper()}{reason[1:]}"))
+    return (*facts, ("Cases", capitalised(reason)))
 
 
 def _short_names(names: tuple[str, str]) -> tuple[str, ...]:
@@ -206,7 +207,7 @@ def _change_card(label: str, changed: int, detail: str) -> Card:
 def _comparison_warnings(comparison: Comparison) -> tuple[str, ...]:
     sentences = [f"Not compared: {sentence}." for sentence in comparison.left_out]
     if comparison.chosen:
-        sentences.append(f"{comparison.chosen[:1].upper()}{comparison.chosen[1:]}.")
+        sentences.append(f"{capitalised(comparison.chosen)}.")
     if not comparison.pairing.paired and any(verdict.worse for verdict in comparison.verdicts):
         sentences.append("The runs flew other cases: chance alone may have changed the verdict of a requirement.")
     return tuple(sentences)
@@ -227,9 +228,9 @@ def _metric_blocks(comparison: Comparison, units: Mapping[str, str]) -> Iterator
     if moved:
         yield _metric_table(comparison, units, moved)
     if selection := comparison.selection_words(count):
-        yield f"{selection.capitalize()}."
+        yield f"{capitalised(selection)}."
     if comparison.same:
-        yield f"{comparison.same_words.capitalize()}: {_listed(comparison, comparison.same)}."
+        yield f"{capitalised(comparison.same_words)}: {_listed(comparison, comparison.same)}."
     if comparison.absent:
         yield f"Without a number in one of the runs: {_listed(comparison, comparison.absent)}."
 

@@ -29,7 +29,7 @@ from reports.studies.tuning_tables import (
     provenance_table,
     published_table,
 )
-from reports.text.numbers import SPACE, count, counted, number, with_unit
+from reports.text.numbers import SPACE, capitalised, count, counted, number, with_unit
 from reports.text.source_places import of_source
 
 GLOSSARY = Terms(
@@ -93,7 +93,7 @@ def _front_sentence(tuned: Tuned) -> str:
         return f"{front_words(tuned.record, count)}."
     sentence = re.sub(r"(?<=\d),(?=\d{3})", SPACE, infeasibility(tuned.record))
     sentence = re.sub(r"-(?=\d)", "−", sentence)
-    return f"{sentence[:1].upper()}{sentence[1:]}."
+    return f"{capitalised(sentence)}."
 
 
 def _search_facts(tuned: Tuned) -> tuple[tuple[str, str], ...]:
@@ -154,7 +154,7 @@ def _search_warnings(tuned: Tuned) -> Iterator[str]:
             "constraints."
         )
     if not_searched := requirements_not_searched(tuned.record):
-        yield f"{not_searched[:1].upper()}{not_searched[1:]}.".replace("'", "’")
+        yield f"{capitalised(not_searched)}.".replace("'", "’")
     failed = int((tuned.evaluations["failed_cases"] > 0).sum())
     if failed:
         ends = tuned.evaluations["commonest_failure"][tuned.evaluations["failed_cases"] > 0].value_counts(sort=False)

@@ -27,6 +27,11 @@ def count(number: int) -> str:
     return f"{number:,}".replace(",", SPACE).replace("-", "−")
 
 
+def capitalised(text: str) -> str:
+    """With a capital first letter; unlike `str.capitalize` it leaves the others as they are."""
+    return text[:1].upper() + text[1:]
+
+
 def counted(number: int, noun: str) -> str:
     """A whole number with its noun: 1 case, 2 cases."""
     return f"{count(number)} {noun}{'' if number == 1 else 's'}"
