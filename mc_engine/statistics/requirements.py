@@ -28,6 +28,7 @@ from mc_engine.sampling.designs import EXTENSIBLE as EXTENSIBLE  # reports take 
 from mc_engine.statistics import binomial, time_uniform, tolerance
 from mc_engine.statistics.limits import LimitCounts, limits_of
 from mc_engine.statistics.tolerance import Judged
+from mc_engine.statistics.worst import Limits
 
 PASS = "pass"
 FAIL = "fail"
@@ -128,6 +129,11 @@ class Verdict:
         if alone and self.lower is not None and self.lower >= self.share:
             return "not every requirement is demonstrated by itself"
         return ""
+
+    @property
+    def limits(self) -> Limits:
+        """The required limits; none of a joint verdict."""
+        return Limits(self.at_most, self.at_least)
 
     @property
     def margin(self) -> float | None:
@@ -307,7 +313,7 @@ def _verdict(
     )
     if ranked is None or which < 0 or not known:
         return verdict
-    return _with_limits_shown(verdict, judged_by(requirement), ranked)
+    return _with_demonstrated_limits(verdict, judged_by(requirement), ranked)
 
 
 def _further_bounds(design: str, looked: bool, chained: bool) -> ShareLimits:
@@ -329,8 +335,8 @@ def _outcome(
     return (FAIL if upper < share else NOT_DEMONSTRABLE), lower, upper
 
 
-def _with_limits_shown(verdict: Verdict, judged: Judged, ranked: Callable[[Judged, int], float]) -> Verdict:
-    """The verdict with the tolerance limit, or both, that the usable values show."""
+def _with_demonstrated_limits(verdict: Verdict, judged: Judged, ranked: Callable[[Judged, int], float]) -> Verdict:
+    """The verdict with the tolerance limit, or both, that the usable values demonstrate."""
     lost, usable = verdict.no_number, verdict.tried - verdict.no_number
     worst_is_largest = verdict.at_least is None
     rank = (tolerance.upper_rank if worst_is_largest else tolerance.lower_rank)(usable, verdict.accepted, lost)

@@ -367,7 +367,7 @@ def _note(name: str, verdict: Verdict | None, before: Verdict | None) -> str:
         return verdict.remark
     if before.metric != verdict.metric:
         return f"the metric is {verdict.metric}, in A {before.metric}"
-    if (before.at_least, before.at_most) != (verdict.at_least, verdict.at_most):
+    if before.limits != verdict.limits:
         return "the limit is different"
     asked, asks = (before.share, before.confidence), (verdict.share, verdict.confidence)
     return "the required probability is different" if asked != asks else ""

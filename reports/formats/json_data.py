@@ -13,7 +13,6 @@ from pydantic import BaseModel, ConfigDict
 
 from mc_engine.statistics import Summary, Verdict
 from mc_engine.statistics.moments import number_or_none
-from mc_engine.statistics.worst import Limits
 from reports.document.blocks import Document, FigureBlock, Table, Terms, Text
 from reports.run.flown import Flown
 
@@ -271,10 +270,9 @@ def _metric_record(flown: Flown, name: str, summary: Summary, change: float | No
 
 
 def _worst_records(flown: Flown, verdict: Verdict) -> list[WorstRecord]:
-    limits = Limits(verdict.at_most, verdict.at_least)
-    worst = flown.every.worst(verdict.metric, WORST, limits)
+    worst = flown.every.worst(verdict.metric, WORST, verdict.limits)
     values = worst[verdict.metric].to_numpy(dtype=np.float64)
-    margins = limits.margins(values) * limits.reach
+    margins = verdict.limits.margins(values) * verdict.limits.reach
     return [
         WorstRecord(requirement=verdict.name, case_id=int(case), value=float(value), margin=float(margin))
         for case, value, margin in zip(worst["case_id"], values, margins, strict=True)

@@ -179,13 +179,7 @@ def _distribution_figures(flown: Flown, names: list[str], title: str, height: fl
 
 def _distribution_plot(flown: Flown, name: str, height: float) -> Plot:
     values, summary = flown.values(name), flown.summaries[name]
-    limits = {
-        limit
-        for verdict in flown.verdicts
-        if verdict.metric == name
-        for limit in (verdict.at_most, verdict.at_least)
-        if limit is not None
-    }
+    limits = {limit for verdict in flown.verdicts if verdict.metric == name for limit in verdict.limits.ends}
     used = "" if summary.n_used == summary.n_tried else f"{count(summary.n_used)} of {count(summary.n_tried)} cases"
     return histogram(
         values[np.isfinite(values)],

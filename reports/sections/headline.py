@@ -116,8 +116,7 @@ def _demonstrated(flown: Flown, name: str, limits: Limits) -> str:
     digits; empty without it."""
     for verdict in flown.verdicts:
         known = verdict.enclosed if limits.two_sided else verdict.demonstrated
-        shown = verdict.at_most == limits.at_most and verdict.at_least == limits.at_least
-        if verdict.metric == name and known is not None and shown:
+        if verdict.metric == name and known is not None and verdict.limits == limits:
             where = f"in {given_percent(verdict.share)} of cases, {given_percent(verdict.confidence)} confidence"
             return f"{demonstrated_text(verdict, flown.unit(name))} {where}"
     return ""

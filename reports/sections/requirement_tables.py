@@ -28,7 +28,7 @@ def margin_block(flown: Flown) -> FigureBlock | None:
     """Margins of all requirements on one axis; None where no case has a number."""
     names, margins, tones, left_out = [], [], [], []
     for verdict in flown.own.verdicts:
-        limits = Limits(verdict.at_most, verdict.at_least)
+        limits = verdict.limits
         if not _has_width(limits):
             left_out.append(verdict.name)
             continue
@@ -129,7 +129,7 @@ def _requirement_row(flown: Flown, verdict: Verdict, source: str) -> tuple[Cell,
 def _margin_cell(verdict: Verdict, unit: str) -> Cell:
     if verdict.margin is None:
         return Cell("–")
-    limits = Limits(verdict.at_most, verdict.at_least)
+    limits = verdict.limits
     share = f"({number(100.0 * verdict.margin / limits.reach, 3, up=False)}{SPACE}%)" if _has_width(limits) else ""
     return Cell(with_unit(number(verdict.margin, 3, up=False), unit), verdict.margin, share)
 
