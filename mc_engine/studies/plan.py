@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 from math import floor, log10
+from operator import attrgetter
 from typing import NamedTuple
 
 from mc_engine.campaign.loading import Campaign
-from mc_engine.campaign.parts import Requirement
 from mc_engine.numbers_in_text import chance_percent, counted, outward
 from mc_engine.statistics.binomial import (
     acceptance_number,
@@ -26,13 +26,13 @@ _RANKS = ("smallest and the largest", "2nd smallest and largest", "3rd smallest 
 class PlanRow(NamedTuple):
     """`cases` is the smallest number of cases that demonstrates the required probability with `failures` failures.
 
-    shown : probability that they demonstrate (lower confidence bound)
+    demonstrated : probability that they demonstrate (lower confidence bound)
     half_rate : probability that this number of cases passes a system that fails half as often as allowed
     """
 
     failures: int
     cases: int
-    shown: float
+    demonstrated: float
     half_rate: float
 
 
@@ -50,7 +50,7 @@ def table_lines(rows: Sequence[PlanRow], share: float, confidence: float) -> Ite
     digits = max(6, 3 - floor(log10(1.0 - share)))  # three of the share that may fail
     for row in rows:
         anytime = smallest_at_any_time(share, confidence, row.failures)
-        shown = f"{outward(row.shown, digits, up=False):.{digits}f}"
+        shown = f"{outward(row.demonstrated, digits, up=False):.{digits}f}"
         yield f"{row.failures:>8}  {row.cases:>9}  {anytime:>13}  {shown:>18}  {chance_percent(row.half_rate)} %"
 
 
@@ -69,17 +69,14 @@ def plan_lines(campaign: Campaign, failures: Sequence[int] = range(ROWS), two_si
     yield f"{campaign.name}: {counted(campaign.cases, 'case')}, design {campaign.design}"
     if campaign.design not in SAMPLING_DESIGNS:
         yield f'shares of cases of design "{campaign.design}" are no probabilities: what follows is for "mc"'
-    asked = sorted(campaign.requirements, key=_wanted, reverse=True)
-    for (share, confidence), group in groupby(asked, key=_wanted):
+    required = attrgetter("share", "confidence")
+    asked = sorted(campaign.requirements, key=required, reverse=True)
+    for (share, confidence), group in groupby(asked, key=required):
         yield from _requirement_block(
             ", ".join(requirement.name for requirement in group), share, confidence, failures, campaign.cases, two_sided
         )
     if len(asked) > 1:
         yield from _joint_block(campaign, failures)
-
-
-def _wanted(requirement: Requirement) -> tuple[float, float]:
-    return requirement.share, requirement.confidence
 
 
 def _requirement_block(

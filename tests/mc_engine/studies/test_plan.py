@@ -26,7 +26,7 @@ def test_the_smallest_samples_are_those_of_the_tables(share, confidence, cases):
 
 @pytest.mark.parametrize("row", ROWS)
 def test_a_row_says_what_share_it_demonstrates(row):
-    assert row.shown >= 0.9973 > lower_bound(row.cases - 1 - row.failures, row.cases - 1, 0.90)
+    assert row.demonstrated >= 0.9973 > lower_bound(row.cases - 1 - row.failures, row.cases - 1, 0.90)
 
 
 @given(share=st.floats(0.5, 0.999), confidence=st.floats(0.5, 0.99), cases=st.integers(1, 5000))
