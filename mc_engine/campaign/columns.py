@@ -46,7 +46,7 @@ def result_columns(model: System) -> "list[Column]":
     return columns
 
 
-def case_columns(model: System, dispersions: Sequence[Dispersion], upstream: "Sequence[Column]" = ()) -> "list[Column]":
+def case_columns(model: System, dispersions: Sequence[Dispersion], upstream: "Sequence[Column]") -> "list[Column]":
     """All columns of a campaign's table; `upstream` are those of the run that it takes inputs from."""
     return [
         *upstream,

@@ -42,7 +42,7 @@ class Sources:
         """Names, such as "lib/guidance.py", and contents in a fixed order."""
         yield from _named({**self.files, **self.data}, self.home)
 
-    def with_data(self, names: Sequence[str], read: Iterable[Path] = ()) -> "Sources":
+    def with_data(self, names: Sequence[str], read: Iterable[Path]) -> "Sources":
         """The same with the data of the model itself; ModelError for a name that is wrong.
 
         read : files that its curves were read from; each must stand in a call of `curve` or `surface`.

@@ -79,13 +79,11 @@ class Piece:
         return Piece(self.store, self.part, max(first, self.first), min(stop, self.stop))
 
 
-def merge_shards(
-    out: Path, folders: Sequence[Path], chunk: int | None = None, workers: int | None = None
-) -> tuple[Store, Campaign]:
+def merge_shards(out: Path, folders: Sequence[Path], chunk: int | None, workers: int | None) -> tuple[Store, Campaign]:
     """Make a run directory with the cases of all shards.  Returns it and its campaign; `complete` adds the rest.
 
-    folders : run directories of shards, in any order; they may overlap or be incomplete.  chunk : cases of a part, by
-    default as in a run on all cores of this machine.  workers : threads, by default one per core.
+    folders : run directories of shards, in any order; they may overlap or be incomplete.  chunk : cases of a part;
+    None: as in a run on all cores of this machine.  workers : threads; None: one per core.
     UsageError if cases are missing or the directories are not of one campaign; StoreError if two differ on a case.
     """
     stores = [open_store(folder) for folder in folders]

@@ -68,7 +68,7 @@ class Drivers:
     singles_tested: int
     pairs_tested: int
     undecided: tuple[str, ...]
-    fewest: int = FEWEST
+    fewest: int
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ def covariance_ellipses(
     return tuple(ellipses)
 
 
-def _principal_axes(points: np.ndarray, thinnest: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+def _principal_axes(points: np.ndarray, thinnest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Centre, standard deviations (larger first) and directions (columns); None for points that have no width."""
     if len(points) < FEWEST:
         return None
@@ -122,7 +122,7 @@ class Density:
     width: float
 
     @classmethod
-    def of(cls, points: np.ndarray, thinnest: float = 0.0) -> "Density | None":
+    def of(cls, points: np.ndarray, thinnest: float) -> "Density | None":
         frame = _principal_axes(points, thinnest)
         if frame is None or len(points) < FEWEST_SMOOTHED:
             return None

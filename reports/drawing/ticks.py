@@ -38,7 +38,7 @@ def axis_ticks(low: float, high: float, most: int = MOST_TICKS, log: bool = Fals
     return log_ticks(low, high, most) if log and high >= 10.0 * low else nice_ticks(low, high, most, whole=whole)
 
 
-def numerals(places: list[float], log: bool = False) -> tuple[list[str], str]:
+def numerals(places: list[float], log: bool) -> tuple[list[str], str]:
     """The places as text with the same decimals each, and the power of ten taken out of them ("" or "×10⁶").
 
     Over a decade of a logarithmic axis each place has digits of its own.

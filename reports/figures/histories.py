@@ -71,9 +71,9 @@ def history_plot(
     label: str,
     time: str,
     lines: Sequence[HistoryLine],
-    envelope: Envelope | None = None,
-    limits: Sequence[Limit] = (),
-    phases: Sequence[Limit] = (),
+    envelope: Envelope | None,
+    limits: Sequence[Limit],
+    phases: Sequence[Limit],
 ) -> Plot:
     """A quantity against the time.  phases : see `phase_limits`."""
     marks: list[Mark] = [*phases]
@@ -100,7 +100,7 @@ def profile_figure(
     labels: tuple[str, str],
     lines: Sequence[HistoryLine],
     envelopes: Sequence[Envelope],
-    lengths: bool = False,
+    lengths: bool,
 ) -> Drawing:
     """One quantity against another, as altitude against speed, with envelopes of the first at levels of the second.
 
