@@ -6,7 +6,6 @@
 import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -122,9 +121,9 @@ def call_prepare(model: Model, inputs: SimpleNamespace, settings: SimpleNamespac
     """
     assert model.prepare is not None
     if inspect.iscoroutinefunction(model.prepare):
-        code = model.prepare.__code__
-        place = f"{Path(code.co_filename).name}, line {code.co_firstlineno}"
-        raise ModelError(f"{place}: `prepare` is an async def; write def, the engine waits for nothing")
+        raise ModelError(
+            f"{place_of(model.prepare)}: `prepare` is an async def; write def, the engine waits for nothing"
+        )
     try:
         with np.errstate(all="ignore"):  # refused cases may divide by zero on their way
             return model.prepare(inputs, settings, refusals)

@@ -149,11 +149,8 @@ def _of_companion(flown: "Flown", store: Store, metrics: list[str]) -> Contribut
     indices = pick_freeze(layout, cases["case_id"].to_numpy(), values)
     shares = ((indices.first, indices.first_error), (indices.total, indices.total_error),
               (indices.fall, indices.fall_error))  # fmt: skip
-    by_metric = {
-        metric: _ranked(flown, metric, layout.groups, *((share[:, k], error[:, k]) for share, error in shares))
-        for k, metric in enumerate(metrics)
-    }
-    used = {metric: int(n) for metric, n in zip(metrics, indices.n_used, strict=True)}
+    by_metric = {name: _ranked(flown, name, layout.groups, shares, k) for k, name in enumerate(metrics)}
+    used = dict(zip(metrics, indices.n_used.tolist(), strict=True))
     # The group of the cases of a run upstream has what is taken from there; random draws, in repeated flights, nothing.
     taken = [*(flown.manifest.get("upstream") or {}).get("links", {})]
     members = {
@@ -169,11 +166,8 @@ def _of_blocks(flown: "Flown", metrics: list[str]) -> Contributions:
     indices = designed_indices(flown.design, flown.case_ids, flown.inputs, values, flown.stated.confidence)
     errors = _errors(flown)
     shares = [(indices.values[name], indices.reach[name] / errors) for name in ("first_order", "total")]
-    by_metric = {
-        metric: _ranked(flown, metric, indices.inputs, *((share[:, k], error[:, k]) for share, error in shares))
-        for k, metric in enumerate(metrics)
-    }
-    used = {metric: int(n) for metric, n in zip(metrics, indices.n_used, strict=True)}
+    by_metric = {name: _ranked(flown, name, indices.inputs, shares, k) for k, name in enumerate(metrics)}
+    used = dict(zip(metrics, indices.n_used.tolist(), strict=True))
     return Contributions(by_metric, 0, used, indices.n_tried, {})
 
 
@@ -191,16 +185,10 @@ def _of_table(flown: "Flown", metrics: list[str]) -> Contributions | None:
     by_metric = {}
     for k, metric in enumerate(metrics):
         left = number_or_none(indices.unexplained[k])
-        ranked = _ranked(
-            flown,
-            metric,
-            indices.inputs,
-            *((share[:, k], error[:, k]) for share, error in shares),
-            unassigned=left or 0.0,
-        )
+        ranked = _ranked(flown, metric, indices.inputs, shares, k, unassigned=left or 0.0)
         rest = [] if left is None or not ranked else [Contributor(metric, UNEXPLAINED, left, left, None, None)]
         by_metric[metric] = (*ranked, *rest)
-    used = {metric: int(n) for metric, n in zip(metrics, indices.n_used, strict=True)}
+    used = dict(zip(metrics, indices.n_used.tolist(), strict=True))
     return Contributions(by_metric, 0, used, indices.n_tried, {}, indices)
 
 
@@ -208,18 +196,20 @@ def _ranked(
     flown: "Flown",
     metric: str,
     names: Sequence[str],
-    *shares: tuple[np.ndarray, np.ndarray],
+    shares: Sequence[tuple[np.ndarray, np.ndarray]],
+    k: int,
     unassigned: float = 0.0,
 ) -> tuple[Contributor, ...]:
     """The contributors of one metric that have an effect, the strongest first.
 
-    shares : values and standard errors float64[n_names] of the first-order and total effects, and of the fall.
+    shares : values and standard errors float64[n_names, n_metrics] of the first-order and total effects, and of the
+        fall.  k : index of the metric.
     unassigned : share of the variance that no input explains; any total effect may be larger by it.
     """
     errors = _errors(flown)
     rows = []
     for row, name in enumerate(names):
-        known = [(float(value[row]), errors * float(error[row])) for value, error in shares]
+        known = [(float(value[row, k]), errors * float(error[row, k])) for value, error in shares]
         if any(np.isfinite(value) for value, _ in known):
             (first, first_ends), (total, total_ends) = (_inside(*effect, 0.0, 1.0) for effect in known[:2])
             total_ends = total_ends and (total_ends[0], min(total_ends[1] + unassigned, 1.0))

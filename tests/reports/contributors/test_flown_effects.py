@@ -151,7 +151,8 @@ def test_effects_are_ranked_by_the_total_one_with_intervals_of_the_stated_confid
     first = np.array([0.05, 0.9, np.nan, -0.03, 0.02]), np.array([0.02, 0.02, np.nan, 0.01, 0.05])
     total = np.array([0.25, 0.6, np.nan, 0.04, 0.99]), np.array([0.02, 0.1, np.nan, 0.01, 0.02])
     flown = SimpleNamespace(stated=SimpleNamespace(confidence=0.9))
-    rows = _ranked(flown, "y", ("a", "b", "gone", "c", "d"), first, total, unassigned=0.05)
+    shares = [(value[:, None], error[:, None]) for value, error in (first, total)]
+    rows = _ranked(flown, "y", ("a", "b", "gone", "c", "d"), shares, 0, unassigned=0.05)
     assert [row.input for row in rows] == ["d", "b", "a", "c"]
     assert [row.size for row in rows] == pytest.approx([0.99, 0.6 + 1.644854 * 0.1 + 0.05, 0.25, 0.04])
     d, b, a, c = rows
