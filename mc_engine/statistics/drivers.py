@@ -246,10 +246,9 @@ def _separation(ranks: np.ndarray, failed: np.ndarray) -> tuple[float, float]:
 
 def _level_test(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
     """The level with most or fewest failed cases for its size: Fisher's exact test of each level against all others."""
-    levels = np.unique(column.values).astype(np.int64)
+    levels, index, size = np.unique(column.values, return_inverse=True, return_counts=True)
     n, n_failed = failed.size, int(failed.sum())
-    size = np.array([np.count_nonzero(column.values == level) for level in levels])
-    hits = np.array([np.count_nonzero(failed & (column.values == level)) for level in levels])
+    hits = np.bincount(index[failed], minlength=levels.size)
     drawn = zip(size.tolist(), hits.tolist(), strict=True)
     tail = np.array(
         [min(hypergeometric_tails(n, n_failed, level_size, level_hits)) for level_size, level_hits in drawn]
@@ -260,7 +259,7 @@ def _level_test(requirement: str, column: InputColumn, failed: np.ndarray) -> Dr
     p_value = float(min(1.0, 2.0 * tail[best] * (1 if len(levels) == 2 else len(levels))))
     if len(levels) == 2:
         best = int(effects.argmax())
-    where = column.levels[levels[best]]
+    where = column.levels[int(levels[best])]
     return Driver(
         requirement,
         (column.name,),
