@@ -70,10 +70,7 @@ def fly_candidates(campaign: Campaign, tuning: Tuning, candidates: np.ndarray, w
     objectives, limited = measured[: len(tuning.objectives)], measured[len(tuning.objectives) :]
     excess = [_excess(values, constraint) for values, constraint in zip(limited, tuning.constraints, strict=True)]
     status, reason = (flown[name].reshape(n, per) for name in ("status", "reason"))
-    reasons = [
-        commonest_failure(status[candidate][~ok[candidate]], reason[candidate][~ok[candidate]])
-        for candidate in range(n)
-    ]
+    reasons = [commonest_failure(how[~good], why[~good]) for how, why, good in zip(status, reason, ok, strict=True)]
     return Scores(
         _side_by_side(objectives, n),
         _side_by_side(limited, n),

@@ -69,7 +69,7 @@ def _source_changes(comparison: Comparison) -> Iterator[str]:
 
 def _metric_table(comparison: Comparison) -> Iterator[str]:
     rows = [_HEADINGS, *(_metric_cells(change, comparison) for change in comparison.moved)]
-    widths = [max(len(row[k]) for row in rows) for k in range(len(_HEADINGS))]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows if len(rows) > 1 else []:
         cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
         yield "  ".join(cells).rstrip()
