@@ -148,14 +148,14 @@ def _check_nothing_missing(stores: Sequence[Store]) -> None:
     missing = gaps([piece for store in stores for piece in store.committed()], range(stores[0].n_cases))
     if not missing:
         return
-    unfinished = dict.fromkeys(store.path for store in stores if store.missing() and _within(missing, store.wanted))
+    unfinished = dict.fromkeys(store.path for store in stores if store.missing() and _overlaps(missing, store.wanted))
     lines = [f"`mc-engine resume {shell_word(path)}`" for path in unfinished]
     lines += _commands_of_absent(stores, missing)
     cases = ", ".join(f"{first} to {stop - 1}" for first, stop in missing)
     raise UsageError(f"cases {cases} are missing; fly them with " + ", ".join(lines))
 
 
-def _within(missing: Sequence[tuple[int, int]], expected: range) -> bool:
+def _overlaps(missing: Sequence[tuple[int, int]], expected: range) -> bool:
     return any(first < expected.stop and expected.start < stop for first, stop in missing)
 
 
