@@ -40,6 +40,8 @@ _TRIAL = 16  # cases
 _SLOWEST = 12  # times that a case takes longer alone, at most: to guess from a flight in lanes
 
 _TIGHT, _NEARLY_AS_TIGHT, _DOUBT = 1e-13, 2e-13, 4.0
+# of the flight that tells the reference's error: where tolerances do not limit the steps, its own would be the same
+_OTHER_STEPS = FINER_STEPS * 5 // 4
 _UNDETERMINED = 0.1  # of a metric's size
 _TOLERANCES = tuple(10.0 ** (-k / 4) for k in range(16, 53))
 # steps are tried so many quarters of an octave longer than the model's own, and so many shorter
@@ -243,9 +245,9 @@ class _Trials:
         self.period = period if model.control is not None else np.inf
         sizes = [np.nanmax(abs(own[f"end_{state.name}"] * state.si_factor)) for state in model.states]
         self._scales = np.array([size if np.isfinite(size) and size > 0.0 else 1.0 for size in sizes])
-        self._true = self._flown(self._reference(_TIGHT))
+        self._true = self._flown(self._reference(_TIGHT, FINER_STEPS))
         self._least = self._sizes_of_rounding()
-        nearly = self._errors(self._flown(self._reference(_NEARLY_AS_TIGHT)))
+        nearly = self._errors(self._flown(self._reference(_NEARLY_AS_TIGHT, _OTHER_STEPS)))
         self._doubt = {name: _DOUBT * error for name, error in nearly.items()}
         self.left_out = self._leave_out(self._errors(own))
 
@@ -292,11 +294,11 @@ class _Trials:
         rtol, *atol = (float(f"{tolerance * scale:.1e}") for scale in (1.0, *self._scales))
         return AdaptiveStep(self.own.until, rtol, tuple(atol), self.period, method)
 
-    def _reference(self, tolerance: float) -> AdaptiveStep:
-        """A clock whose steps are also short enough for what longer ones pass over."""
+    def _reference(self, tolerance: float, n_steps: int) -> AdaptiveStep:
+        """A clock whose steps, so many at least, are also short enough for what longer ones pass over."""
         clock = self._adaptive("dop853", tolerance)
-        longest = min(self.flight_s / FINER_STEPS, float(clock.longest_step))
-        return replace(clock, longest_step=longest, attempts=clock.attempts + 10 * FINER_STEPS)
+        longest = FINER_STEPS / n_steps * min(self.flight_s / FINER_STEPS, float(clock.longest_step))
+        return replace(clock, longest_step=longest, attempts=clock.attempts + 10 * n_steps)
 
     def _sizes_of_rounding(self) -> dict[str, float]:
         """By quantity, such as length, how small a metric is in SI that is but the rounding of larger numbers."""

@@ -191,6 +191,16 @@ def test_a_time_among_several_that_are_alike_is_left_out_and_named(tmp_path, mon
     assert done.output.splitlines()[1].endswith(f"(the model's own; {own.metric}; without lowest_s)")
 
 
+def test_an_error_of_the_reference_itself_does_not_count_where_tolerances_do_not_limit_its_steps(tmp_path):
+    """The reference finds the time of a flat top less exactly than a fixed step, whatever its tolerance."""
+    turn = TURNS.replace("40.0", "5.0").replace("lowest_s=time_of_minimum", "top_s=time_of_maximum")
+    (tmp_path / "model.py").write_text(turn.replace("time_of_minimum)", "time_of_maximum)"))
+    (tmp_path / "campaign.toml").write_text(CASES)
+    own, *others = compare_methods(load_campaign(tmp_path / "campaign.toml"), 16, 1)
+    assert own.metric != "top_s"
+    assert {"abm12", "tp86"} <= {one.clock.method for one in others}
+
+
 def test_bench_prints_a_line_for_each_method(monkeypatch):
     timings = [
         MethodTiming(FixedStep(20.0, 86400.0), 2.5e-8, 60e-6, "speed_m_s"),
