@@ -268,7 +268,7 @@ class _Trials:
         # far beyond the longest flight a limit is none, and short steps may be too many until then
         until = min(float(self.own.until), _NO_LIMIT * self.flight_s)
         grid = self.own if isinstance(self.own, FixedStep) else FixedStep(self.flight_s, until)
-        for method in METHODS["FixedStep"] if not self.cases.model.phases else ():
+        for method in METHODS["FixedStep"] if isinstance(self.own, FixedStep) or not self.cases.model.phases else ():
             fixed = replace(grid, method=method)
             if method != self.own.method and (fixed.rates or not uses_rates(fixed)):
                 yield (replace(fixed, step=step, control_every=every) for step, every in self._grids())

@@ -253,6 +253,16 @@ def test_samples_of_the_control_stay_where_they_are():
     assert trials._adaptive("dop853", 1e-3) == AdaptiveStep(30.0, 1e-3, (2e-3,), 0.5, "dop853")
 
 
+@pytest.mark.parametrize("clock", [FixedStep(0.1, 30.0, method="abm9"), AdaptiveStep(30.0)])
+def test_fixed_steps_are_compared_for_a_model_with_phases_that_takes_fixed_steps(clock):
+    trials = object.__new__(_Trials)
+    trials.own, trials.flight_s, trials.period, trials._scales = clock, 30.0, np.inf, np.array([2.0])
+    trials.cases = SimpleNamespace(model=long_coast.MODEL)
+    methods = {next(ladder).method for ladder in trials.ladders()}
+    fixed = {"rk4", "abm8", "abm10", "abm11", "abm12", "dop853"} if isinstance(clock, FixedStep) else set()
+    assert methods == {"tp86", "dp54"} | fixed
+
+
 def test_a_control_that_the_settings_leave_but_its_first_sample_is_flown_by_other_clocks():
     clock = replace(long_coast.MODEL.clock, control_period=lambda _: np.inf)
     numbers = _in_numbers(clock, None)
