@@ -308,7 +308,8 @@ def _search_fall(looks, newest, back, t, h, count, lanes, last):
         for _ in range(_ITERATIONS):
             value, slope, _ = interpolate(looks.last_differences, count, x)
             x = map_fields(extrema.nearer_zero, x, value, slope, middle)
-        smooth = smooth_of_differences(looks.last_differences, count, map_fields(_kept, 0.0 * t + 1.0, falls), 0.0)
+        enough = where(count < 4.0, 0.0, 1.0)
+        smooth = smooth_of_differences(looks.last_differences, count, map_fields(_kept, enough, falls), 0.0)
         last = map_fields(extrema.later_fall, last, x, chord, smooth, t, h, falls)
     return last
 
@@ -325,7 +326,7 @@ def _search(looks, number, t, h, count, closing, lanes, smooth, best, when, last
     """
     newest, nearest = number % LOOKS, 0 if closing else 1
     form_differences(looks.peaks, looks.peak_differences, newest, best)
-    smooth = smooth_of_differences(looks.peak_differences, count, smooth, 1.0)
+    smooth = smooth_of_differences(looks.peak_differences, count, map_fields(_kept, smooth, count >= 4.0), 1.0)
     everywhere = lanes & ((count < float(LOOKS)) if closing else (count == float(LOOKS)))
     for i in range(LOOKS - nearest):
         back = LOOKS - 1 - i
@@ -347,7 +348,7 @@ def _track_by_all(looks, number, t, h, closing, lanes, count, smooth, seen, last
 
     count : number of values of the motion, including this one
     """
-    ended = lanes & (count <= looks.count) & (looks.count >= 4.0)
+    ended = lanes & (count <= looks.count) & (looks.count >= 2.0)
     if any_lane(ended):
         before = grid_time(number - 1, h, t)
         best, when, last = search(looks, number - 1, before, h, looks.count, True, ended, smooth, best, when, last)
@@ -368,9 +369,8 @@ def _track_by_all(looks, number, t, h, closing, lanes, count, smooth, seen, last
     wanted = lanes & ((count == float(LOOKS)) | ((crests | falls) & (count > float(LOOKS))))
     if any_lane(wanted):
         best, when, last = search(looks, number, t, h, count, False, wanted, smooth, best, when, last)
-    closed = lanes & (count >= 4.0)
-    if closing and any_lane(closed):
-        best, when, last = search(looks, number, t, h, count, True, closed, smooth, best, when, last)
+    if closing:
+        best, when, last = search(looks, number, t, h, count, True, lanes & (count >= 2.0), smooth, best, when, last)
     return best, when, last
 
 

@@ -129,6 +129,19 @@ def test_a_corner_among_the_looks_leaves_a_last_time_to_the_chord(until):
     assert np.abs(error).max() < 0.01 * step  # by the polynomial up to 0.7
 
 
+@pytest.mark.parametrize(("every", "steps"), [(2.0, 60), (3.0, 60), (1e6, 1), (1e6, 2)])
+def test_a_last_time_in_an_arc_of_few_steps_is_that_of_the_chord(every, steps):
+    # each sample changes the discrete state a little; x falls through 500 m once, in any step
+    fall = np.linspace(0.05, steps - 0.05, 150) * 0.1
+    phase = fall - np.pi / 3.0
+    swings = {"x0_km": np.cos(phase), "v0_m_s": 1e3 * np.sin(phase), "gain_1_s": 1e-9, "every": every}
+    columns = flown(by(OSCILLATOR, "abm8"), **swings, until_s=0.1 * steps, step_s=0.1)
+    once = np.cos(columns["end_time_s"] - phase) < 0.5
+    assert once.sum() > 100
+    np.testing.assert_allclose(columns["late_time_s"][once], fall[once], rtol=0.0, atol=0.001)
+    same_bytes(columns, flown(by(OSCILLATOR, "abm8"), width=1, **swings, until_s=0.1 * steps, step_s=0.1))
+
+
 def test_a_crest_before_a_sample_is_the_same_beside_a_case_that_ends_in_that_step():
     # crests before the look at 3.1 s, the last before a sample; two cases break, one of them in the step after
     crests = np.append(np.linspace(3.04, 3.09, 6), [3.1, 3.1])
