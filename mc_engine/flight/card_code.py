@@ -47,6 +47,7 @@ _OF_THE_PROCESSOR_ONLY = {
     "pow", "powi", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "exp2", "exp10",
     "log", "log2", "log10", "ldexp", "frexp", "sincos", "modf",
 }  # fmt: skip
+_REMAINDER = re.compile(r"= frem ")
 _CHOICE = re.compile(
     r"^ *(%\S+) = select (i1|<\d+ x i1>) ([^,]+), (double|<\d+ x double>) (<[^>]*>|[^,]+), \4 (<[^>]*>|[^,\n]+)(.*)$",
     re.MULTILINE,
@@ -196,7 +197,12 @@ def _optimised(text: str) -> str:
     passes = llvm.create_pass_builder(machine, options)
     passes.getModulePassManager().run(module, passes)
     _refuse_unknown([function.name for function in module.functions if function.is_declaration])
-    return choices_of_bits(str(module))
+    optimised = str(module)
+    # the back end writes x - trunc(x / y) * y, which differs from the remainder: 0.5 % 0.1 would be -3e-17, not 0.1
+    if _REMAINDER.search(optimised):
+        raise EngineError("physics takes a remainder of plain numbers, by %, // or divmod, which a card computes "
+                          "otherwise; take floor of mc_engine.lanes, or fly on the processor")  # fmt: skip
+    return choices_of_bits(optimised)
 
 
 def _refuse_unknown(names: Sequence[str]) -> None:

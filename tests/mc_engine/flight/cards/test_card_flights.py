@@ -240,12 +240,21 @@ def test_a_flight_that_ends_with_an_error_is_told_as_on_the_processor(tmp_path, 
         assert (time[1] == cases[1]) == (7.0 not in cases)
 
 
-def test_what_a_card_cannot_compute_is_named(tmp_path, monkeypatch):
-    """Asked to write it, LLVM would end the process."""
+@pytest.mark.parametrize(
+    ("term", "sentence"),
+    [  # asked to write the first, LLVM would end the process; of the second it would write another number
+        ("2.5 ** o.k", "physics calls pow on plain numbers, which a card has not"),
+        (
+            "divmod(o.k, 0.7)[1]",
+            "physics takes a remainder of plain numbers, by %, // or divmod, which a card computes",
+        ),
+    ],
+)
+def test_what_a_card_cannot_compute_is_named(term, sentence, tmp_path, monkeypatch):
     install(monkeypatch, FakeDriver())
-    (tmp_path / "model.py").write_text(FALL)
+    (tmp_path / "model.py").write_text(FALL.replace("2.5 ** o.k", term))
     model, inputs = load_model("model.py", tmp_path), {"gravity_m_s2": np.array([9.5, 9.0, 9.25]), "k": 1.37}
-    with pytest.raises(EngineError, match="physics calls pow on plain numbers, which a card has not"):
+    with pytest.raises(EngineError, match=sentence):
         fly(model, inputs, np.arange(3), 1, folder=tmp_path, width=1, build=cards._card_kernel)
 
 
