@@ -16,6 +16,7 @@ from mc_engine.campaign.sections import LARGEST
 from mc_engine.campaign.tables_beside import empirical_numbers
 from mc_engine.model.fields import Parameter, Setting
 from mc_engine.model.files import FileFault, resolve_beside
+from mc_engine.numbers_in_text import counted
 from mc_engine.sampling.distributions import (
     Beta,
     Constant,
@@ -192,7 +193,7 @@ def _discrete(context: DispersionContext) -> Distribution | None:
     values = checked_values(context)
     weights = context.keys.weights if context.keys.weights is not None else [1.0] * len(values)
     if len(weights) != len(values):
-        context.findings.add("weights", f"{len(weights)} weights for {len(values)} values")
+        context.findings.add("weights", f"{counted(len(weights), 'weight')} for {counted(len(values), 'value')}")
     elif not sum(weights) >= 1.0 / LARGEST:
         context.findings.add("weights", "are too small" if any(weights) else "are all zero")
     elif None not in values:

@@ -56,7 +56,7 @@ class Campaign:
     Read one with `load_campaign`.  Numbers are in the units that the model declares.
 
     name : str, the shipped name ("deorbit/map"), or a name made from the path of the file
-    title : str, one line for the report
+    title : str, one line for the report;  note : str, a remark for it
     text : str, the campaign file as read; its `cases` and `seed` may have been replaced by those below
     directory : Path, the folder of the file, to which the names of tables and orbit messages are relative
     model : Model or Simulator, the system that is flown
@@ -93,6 +93,7 @@ class Campaign:
 
     name: str
     title: str
+    note: str
     text: str
     directory: Path
     model: System
@@ -233,6 +234,7 @@ def _assemble(
     return Campaign(
         name=name,
         title=section.title or model.title,
+        note=section.note,
         text=text,
         directory=directory,
         model=model,

@@ -94,7 +94,7 @@ class CampaignSection(Section):
         description="most steps of AdaptiveStep; a case that needs more ends as step-limit",
     )
     title: Line = Field(default="", description="one line for the report")
-    note: Note = ""
+    note: Note = Field(default="", description="remark, shown in the report")
 
 
 class DispersionSection(Section):

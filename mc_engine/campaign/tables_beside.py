@@ -16,7 +16,7 @@ import numpy as np
 
 from mc_engine.campaign.sections import LARGEST
 from mc_engine.model.files import FileFault, open_beside
-from mc_engine.numbers_in_text import is_real
+from mc_engine.numbers_in_text import counted, is_real
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -88,7 +88,7 @@ def _csv_columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]
     most, ragged = MOST_CSV_CELLS // len(names), []
     for line, row in filled:
         if len(row) != len(names):
-            ragged.append(f"line {line}: {len(row)} fields")
+            ragged.append(f"line {line}: {counted(len(row), 'field')}")
         elif len(columns[0]) == most:
             raise FileFault(f'"{path.name}" has more than {MOST_CSV_CELLS:,} cells; a Parquet file may have more')
         for column, cell in zip(columns, row, strict=False):
@@ -98,7 +98,7 @@ def _csv_columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]
     if ragged:
         ending = " and more" if len(ragged) > _MOST_LINES else ""
         lines = ", ".join(ragged[:_MOST_LINES])
-        raise FileFault(f'"{path.name}", {lines}{ending} where {len(names)} columns are named')
+        raise FileFault(f'"{path.name}", {lines}{ending}; its first line names {counted(len(names), "column")}')
     return {name: np.array(column, dtype=object) for name, column in zip(names, columns, strict=True)}
 
 

@@ -51,6 +51,7 @@ def manifest_of(campaign: Campaign) -> dict[str, Any]:
         "campaign": {
             "name": campaign.name,
             "title": campaign.title,
+            "note": campaign.note,
             "model": campaign.model_reference,
             "design": campaign.design,
             "seed": campaign.seed,

@@ -42,6 +42,7 @@ class _Named(Record):
 class _Campaign(_Named):
     cases: Annotated[int, Field(ge=1, le=MOST_CASES)]
     title: str = ""
+    note: str = ""
     model: str = ""
     design: str = "mc"
     seed: Seed | None = None

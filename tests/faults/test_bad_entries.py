@@ -91,7 +91,7 @@ def test_rows_columns_and_lines_of_a_table_have_bounds(tmp_path, monkeypatch):
     for text, words in [
         ("a,b\n" + "1,2\n" * 501, "more than 1,000 cells"),
         ("a,b\n1," + "2" * 200_000, "field larger than field limit"),
-        (",".join(f"c{k}" for k in range(900)) + "\n" + "1\n" * 9, "900 columns are named"),
+        (",".join(f"c{k}" for k in range(900)) + "\n" + "1\n" * 9, "names 900 columns"),
     ]:
         path.write_text(text)
         with pytest.raises(FileFault, match=words):

@@ -40,7 +40,7 @@ def test_a_faulty_file_is_refused_with_row_and_column(tmp_path):
         ("a,a\n1,2\n", "a", 'has the column "a" twice'),
         ("a;b\n1,5;2\n", "a", "has semicolons or tabs between its columns; put commas there, and points in numbers"),
         ("a,\n1,2\n", "a", "a column without a name"),
-        ("a,b\n1\n", "a", "line 2: 1 fields where 2 columns are named"),
+        ("a,b\n1\n", "a", "line 2: 1 field; its first line names 2 columns"),
         ("a\n1\nx\n", None, 'row 2, column "a": "x" is not a finite number'),
         ("a\n1\nnan\n", None, 'row 2, column "a": "nan" is not a finite number'),
         ('a\n"1\n', None, "is not CSV text"),

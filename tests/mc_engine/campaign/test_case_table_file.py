@@ -63,7 +63,7 @@ def test_a_fault_in_the_table_is_refused_with_row_and_column(folder):
         ("-2", "-200", '"cases.csv", row 2, column "speed_pct": -200 is not within -100 % and above'),
         ("clipped", "cut", '"cases.csv", row 2, column "control": "cut" is none of continuous, clipped, off'),
         ("false", "no", '"cases.csv", row 2, column "drag": "no" is none of true, false'),
-        ("\n1,-2,", "\n1,", '"cases.csv", line 3: 4 fields where 5 columns are named'),
+        ("\n1,-2,", "\n1,", '"cases.csv", line 3: 4 fields; its first line names 5 columns'),
         ("height_km", "speed_pct", '"cases.csv" has the column "speed_pct" twice'),
     ]:
         (folder / "cases.csv").write_text(CSV.replace(old, new))

@@ -94,7 +94,7 @@ MISTAKES = [
     ('dist = "beta"\nalpha = 1\nbeta = 1\nlower = 2\nupper = 1', "lower", "2 is not below upper = 1"),
     ('dist = "beta"\nalpha = 2\nbeta = 1e16\nlower = 1\nupper = 2', "beta",
      "1e+16 is not allowed; it must be at most 1e+12"),  # SciPy answers NaN, and cases flew with it
-    ('dist = "discrete"\nvalues = [1, 2]\nweights = [1]', "weights", "1 weights for 2 values"),
+    ('dist = "discrete"\nvalues = [1, 2]\nweights = [1]', "weights", "1 weight for 2 values"),
     ('dist = "discrete"\nvalues = [1, 2]\nweights = [1, 2, 3]', "weights", "3 weights for 2 values"),
     ('dist = "discrete"\nvalues = [1, 2]\nweights = [0, 0]', "weights", "are all zero"),
     ('dist = "discrete"\nvalues = [1, 2]\nweights = [5e-324, 0]', "weights", "are too small"),

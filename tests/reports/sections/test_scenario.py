@@ -9,7 +9,7 @@ from mc_engine.campaign.loading import load_campaign
 from mc_engine.model import time_of
 from mc_engine.runner.manifest import manifest_of
 from reports.contents import build
-from reports.document.blocks import FigureBlock, Table
+from reports.document.blocks import FigureBlock, Table, Text
 from reports.drawing.marks import Limit, Points
 from reports.run.flown import Flown
 
@@ -120,6 +120,13 @@ def test_assumptions_are_what_the_campaign_file_sets_and_the_rest_is_in_the_appe
     assert "Correlated inputs" not in scenario
     (fixed,) = section(run, "inputs").blocks
     assert [row[0].text for row in fixed.rows] == ["gain_1_s", "control"]
+
+
+def test_the_remark_of_the_campaign_file_is_in_the_report():
+    text = load_campaign("deorbit").text.replace("[campaign]", '[campaign]\nnote = "Flown with the tanks of May."', 1)
+    run = synthetic_run(50, failed=0)
+    run.manifest["campaign"] |= manifest_of(load_campaign("deorbit", text=text))["campaign"]
+    assert Text(("Flown with the tanks of May.",)) in section(run, "scenario").blocks
 
 
 def test_inputs_that_the_campaign_correlates_are_named_with_rank_and_source():
