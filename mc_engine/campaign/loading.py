@@ -56,7 +56,8 @@ class Campaign:
     Read one with `load_campaign`.  Numbers are in the units that the model declares.
 
     name : str, the shipped name ("deorbit/map"), or a name made from the path of the file
-    title : str, one line for the report;  note : str, a remark for it
+    title : str, one line for the report
+    note : str, a remark for the report
     text : str, the campaign file as read; its `cases` and `seed` may have been replaced by those below
     directory : Path, the folder of the file, to which the names of tables and orbit messages are relative
     model : Model or Simulator, the system that is flown
