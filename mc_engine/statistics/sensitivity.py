@@ -49,8 +49,8 @@ class Sensitivity:
 
     r_squared : float64[n_metrics], fraction of variance that the linear regression of `src` explains.
     unexplained : float64[n_metrics], fraction that the surrogate of `total` leaves; total may be larger by it.
-    correlated : the two inputs with the strongest rank correlation, and its value; None for fewer than two inputs with
-        an order (numbers, or two levels).
+    correlated : the two inputs with the strongest rank correlation, and its value; None for too few cases, and where no
+        two inputs with an order (numbers, or two levels) are correlated, not even by chance.
     """
 
     inputs: tuple[str, ...]
