@@ -31,7 +31,7 @@ AT_EVENT = 4  # numbers that a row of the timeline tells
 def scenario_blocks(flown: Flown) -> Iterator[Table | str | None]:
     """The vehicle and the campaign in words, the timeline of the nominal case, assumptions and dispersions."""
     yield _vehicle(flown)
-    yield flown.campaign.get("note") or None
+    yield from filter(None, map(str.strip, flown.campaign.get("note", "").split("\n\n")))
     yield timeline_table(flown)
     changed = fixed_table(flown, "Assumptions: values set by the campaign file", True)
     if changed is None and flown.manifest.get("parameters"):

@@ -123,10 +123,12 @@ def test_assumptions_are_what_the_campaign_file_sets_and_the_rest_is_in_the_appe
 
 
 def test_the_remark_of_the_campaign_file_is_in_the_report():
-    text = load_campaign("deorbit").text.replace("[campaign]", '[campaign]\nnote = "Flown with the tanks of May."', 1)
+    note = r'note = "Flown with the tanks of May.\n\n\nNot weighed since.\n"'
+    text = load_campaign("deorbit").text.replace("[campaign]", f"[campaign]\n{note}", 1)
     run = synthetic_run(50, failed=0)
     run.manifest["campaign"] |= manifest_of(load_campaign("deorbit", text=text))["campaign"]
-    assert Text(("Flown with the tanks of May.",)) in section(run, "scenario").blocks
+    told = [block for block in section(run, "scenario").blocks if isinstance(block, Text)]
+    assert told[1:3] == [Text(("Flown with the tanks of May.",)), Text(("Not weighed since.",))]
 
 
 def test_inputs_that_the_campaign_correlates_are_named_with_rank_and_source():
