@@ -93,6 +93,13 @@ class ColumnRecord(_Named):
     kind: Literal["number", "integer", "word", "switch"] = "number"
 
 
+class _Correlation(Record):
+    first: str
+    second: str
+    rank: float
+    source: str = ""
+
+
 class _Requirement(_Named):
     metric: str
     share: Share
@@ -212,6 +219,7 @@ class _Manifest(Head):
     shard: _Shard | None = None
     imported: _Imported | None = None
     sensitivity: _Sensitivity | None = None
+    correlations: list[_Correlation] = []
     ranges: dict[str, Annotated[list[float | None], Field(min_length=2, max_length=2)]] = {}
     event_times: list[str] = []
     metric_outputs: dict[str, str] = {}

@@ -83,6 +83,7 @@ DIRTY = {
     "imported as a word": lambda m: m.update(imported="results.parquet"),
     "imported from no file": lambda m: m.update(imported={"history": None}),
     "flights for contributions as a number": lambda m: m.update(sensitivity=5),
+    "correlations as words": lambda m: m.update(correlations=["height_m, speed_m_s"]),
     "a range of one number": lambda m: m.update(ranges={"height_m": [1.0]}),
     "a range of words": lambda m: m.update(ranges={"height_m": ["low", "high"]}),
     "a number that is none": lambda m: m["parameters"].append({"name": "p", "value": float("nan")}),
