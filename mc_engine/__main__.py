@@ -40,11 +40,13 @@ def main() -> None:
     from mc_engine.interruption import install_handlers
     from mc_engine.text import clean_streams
     from mc_engine.unforeseen import UNFORESEEN, catch_all, refuse_small_memory, unforeseen
+    from mc_engine.unused_imports import leave_out_unused
 
     _refuse_lost_folder()
     _refuse_build_time()
     install_handlers()  # before the rest is loaded, which takes longest
     collect_rarely()
+    leave_out_unused()
     for library in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(library, "1")  # for small matrices its threads cost more than they gain
     # or pydantic reads the metadata of all installed packages; also in processes that the engine starts

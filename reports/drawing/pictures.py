@@ -11,7 +11,7 @@ def render_picture(svg: str, kind: Any) -> bytes:
     """One figure as PDF or PNG, on white."""
     page: Any = b'#set page(width: auto, height: auto, margin: 4pt)\n#image(bytes(sys.inputs.svg), format: "svg")'
     return typst.compile(
-        page, font_paths=[fonts()], ignore_system_fonts=True, sys_inputs={"svg": svg}, format=kind, ppi=200.0
+        page, font_paths=[fonts()], ignore_system_fonts=True, sys_inputs={"svg": svg}, format=kind, ppi=144.0
     )
 
 

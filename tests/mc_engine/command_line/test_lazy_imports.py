@@ -45,6 +45,15 @@ def test_a_run_its_status_and_its_summary_load_no_pandas(here):
         assert "pandas" not in loaded_by(*arguments)
 
 
+def test_parts_of_numpy_that_scipy_only_names_are_not_loaded(tmp_path):
+    command = [sys.executable, "-X", "importtime", "-m", "mc_engine", "run", "minimal", "--cases", "8", "--no-report"]
+    command += ["--out", str(tmp_path / "flown")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=ENVIRONMENT)
+    loaded = {line.split("|")[-1].strip() for line in done.stderr.splitlines()}
+    assert {"scipy.special", "numpy.f2py"} <= loaded
+    assert not {"numpy.f2py.crackfortran", "numpy.polynomial.chebyshev", "unittest.case"} & loaded
+
+
 def test_the_engine_is_imported_where_the_system_has_no_signals_of_posix():
     script = (
         "import signal\n"
