@@ -9,6 +9,7 @@ import typer
 
 from mc_engine.command_line.after_flight import echo_publication
 from mc_engine.command_line.app import (
+    DAMAGED,
     NOT_MET,
     TOO_MANY_FAILED,
     USAGE,
@@ -34,7 +35,7 @@ from mc_engine.command_line.app import (
     run_here,
     write_reports,
 )
-from mc_engine.command_line.next_step import MERGE, after_flight, after_merge, is_complete, journal_lines
+from mc_engine.command_line.next_step import MERGE, after_flight, after_merge, after_run, is_complete, journal_lines
 from mc_engine.errors import DiskError, RunInterrupted, UsageError
 from mc_engine.interruption import NOTHING_BEGUN, advise, raise_if_signalled
 from mc_engine.numbers_in_text import counted
@@ -301,16 +302,12 @@ def resume(
 
 
 def _leave_complete(store: "Store", url: str | None) -> None:
-    from mc_engine.sampling.designs import extension_problem
+    from mc_engine.store.verification import REPAIR, damages, remedies
 
-    folder, named = store.path, shell_word(store.path)
-    more = f"`mc-engine extend {named} --cases N` adds cases, "
-    if extension_problem(store.manifest, store.n_cases, store.n_cases + 1):
-        more = ""
-    next_step = f"{more}`mc-engine report {named}` writes the reports anew"
-    if store.manifest.get("shard"):
-        next_step = MERGE
-    typer.echo(f"{folder}: is complete; {next_step}")
+    folder = store.path
+    if damaged := [item for item in damages(folder) if item.mended_by == REPAIR]:
+        leave(DAMAGED, f"{folder}/{damaged[0].what}; {remedies(folder, damaged)[0]}")
+    typer.echo(f"{folder}: is complete; {after_run(store)}")
     if url is not None:
         echo_publication(folder, url)
 

@@ -5,10 +5,14 @@ Read from the journal without numba or pandas, since the signal may have interru
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mc_engine.interruption import NOTHING_BEGUN
 from mc_engine.shell_words import shell_word
 from mc_engine.store.run_files import JOURNAL, MANIFEST
+
+if TYPE_CHECKING:
+    from mc_engine.store.store import Store
 
 MERGE = "`mc-engine merge RUN SHARD...` makes one run of all shards, and its reports"
 _UNFINISHED = ("created", "started", "rerun", "extended", "part-withdrawn")  # events that `finished` has to follow
@@ -55,6 +59,19 @@ def is_complete(run: Path) -> bool:
     store = open_store(run)
     finished = _is_finished(_events(run)) and not store.missing() and not store.lost_files()
     return finished and not is_left_by_dead(run)
+
+
+def after_run(store: "Store") -> str:
+    """What can be done with a run that is complete."""
+    from mc_engine.sampling.designs import extension_problem
+
+    if store.manifest.get("shard"):
+        return MERGE
+    word = shell_word(store.path)
+    more = f"`mc-engine extend {word} --cases N` adds cases, "
+    if extension_problem(store.manifest, store.n_cases, store.n_cases + 1):
+        more = ""
+    return f"{more}`mc-engine report {word}` writes the reports anew"
 
 
 def journal_lines(run: Path) -> int:

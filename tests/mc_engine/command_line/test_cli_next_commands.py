@@ -152,6 +152,16 @@ def test_a_run_that_is_complete_is_not_flown_again(here):
     assert not (here / "flown" / "report.html").exists()
 
 
+def test_a_run_with_a_damaged_part_is_not_said_to_be_complete(here):
+    store = small_store(here / "flown")
+    store.note("finished")
+    part = store.path / store.parts[1].file
+    content = part.read_bytes()
+    part.write_bytes(content[:100] + bytes([content[100] ^ 1]) + content[101:])
+    said = f"flown/{store.parts[1].file}: damaged, its SHA-256 is not the one in the journal; `mc-engine resume flown"
+    fails_with(5, call("resume", "flown"), f"{said} --repair` flies bad parts again")
+
+
 def test_an_extension_that_was_interrupted_before_it_began_is_not_said_to_be_there(here, monkeypatch):
     small_store(here / "flown").note("finished")
     monkeypatch.setattr(runner, "extend", lambda *_, **__: _interrupted())
