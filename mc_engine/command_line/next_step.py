@@ -4,9 +4,11 @@ Read from the journal without numba or pandas, since the signal may have interru
 """
 
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mc_engine.errors import EngineError
 from mc_engine.interruption import NOTHING_BEGUN
 from mc_engine.shell_words import shell_word
 from mc_engine.store.run_files import JOURNAL, MANIFEST
@@ -63,14 +65,16 @@ def is_complete(run: Path) -> bool:
 
 def after_run(store: "Store") -> str:
     """What can be done with a run that is complete."""
+    from mc_engine.runner.flown_campaign import campaign_of
     from mc_engine.sampling.designs import extension_problem
 
     if store.manifest.get("shard"):
         return MERGE
-    word = shell_word(store.path)
-    more = f"`mc-engine extend {word} --cases N` adds cases, "
-    if extension_problem(store.manifest, store.n_cases, store.n_cases + 1):
-        more = ""
+    word, more = shell_word(store.path), ""
+    with suppress(EngineError):
+        campaign_of(store)  # refuses a run of other sources, or an imported one
+        if not extension_problem(store.manifest, store.n_cases, store.n_cases + 1):
+            more = f"`mc-engine extend {word} --cases N` adds cases, "
     return f"{more}`mc-engine report {word}` writes the reports anew"
 
 

@@ -141,8 +141,7 @@ def test_a_sample_is_not_written_over_a_table_that_the_campaign_reads(here):
 
 
 def test_a_run_that_is_complete_is_not_flown_again(here):
-    store = small_store(here / "flown")
-    store.note("finished")
+    assert call("run", "minimal", "--cases", "20", "--no-report", "--out", "flown").exit_code == 0
     before = len(open_store("flown").notes())
     answer = call("resume", "flown")
     assert answer.exit_code == 0
@@ -150,6 +149,11 @@ def test_a_run_that_is_complete_is_not_flown_again(here):
     assert "`mc-engine report flown` writes the reports anew" in answer.stdout
     assert len(open_store("flown").notes()) == before
     assert not (here / "flown" / "report.html").exists()
+
+
+def test_a_complete_run_of_other_sources_is_not_said_to_be_extended(here):
+    small_store(here / "flown").note("finished")  # its manifest does not say which sources flew it
+    assert call("resume", "flown").stdout == "flown: is complete; `mc-engine report flown` writes the reports anew\n"
 
 
 def test_a_run_with_a_damaged_part_is_not_said_to_be_complete(here):
