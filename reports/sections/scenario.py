@@ -1,6 +1,7 @@
 """The scenario of a run: vehicle and campaign, timeline, assumptions and dispersions."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from mc_engine.statistics import Summary
 from mc_engine.store.manifest_file import seed_remark
@@ -31,7 +32,7 @@ AT_EVENT = 4  # numbers that a row of the timeline tells
 def scenario_blocks(flown: Flown) -> Iterator[Table | str | None]:
     """The vehicle and the campaign in words, the timeline of the nominal case, assumptions and dispersions."""
     yield _vehicle(flown)
-    yield from filter(None, map(str.strip, flown.campaign.get("note", "").split("\n\n")))
+    yield from note_paragraphs(flown.campaign)
     yield timeline_table(flown)
     changed = fixed_table(flown, "Assumptions: values set by the campaign file", True)
     if changed is None and flown.manifest.get("parameters"):
@@ -39,6 +40,11 @@ def scenario_blocks(flown: Flown) -> Iterator[Table | str | None]:
     yield changed
     yield input_table(flown) or "No input is dispersed: all cases have the nominal inputs."
     yield correlation_table(flown)
+
+
+def note_paragraphs(campaign: Mapping[str, Any]) -> Iterator[str]:
+    """The paragraphs of the note of [campaign], by its record in a manifest."""
+    yield from filter(None, map(str.strip, campaign.get("note", "").split("\n\n")))
 
 
 def _vehicle(flown: Flown) -> str:

@@ -31,6 +31,7 @@ from reports.drawing.palette import BLUE, INK, PURPLE, VERMILION
 from reports.figures.clouds import MOST, case_scatter
 from reports.sections.figure_blocks import thinned_by_outcome
 from reports.sections.provenance import origin_table
+from reports.sections.scenario import note_paragraphs
 from reports.sections.tables import dispersed_table
 from reports.text.numbers import (
     SPACE,
@@ -100,10 +101,11 @@ GLOSSARY = Terms(
 def build_rare_event(record: RareEventRecord, name: str) -> Document:
     """The report of an estimate; `name` is its directory's name."""
     campaign, result = record.record["campaign"], record.result
+    inputs = dispersed_table(record.record["inputs"], "Dispersed inputs")
     sections = (
         Section("failures", "Failures", as_blocks(_failures(record))),
         Section("levels", "Levels of the estimate", _levels(result)),
-        Section("inputs", "Dispersed inputs", (dispersed_table(record.record["inputs"], "Dispersed inputs"),)),
+        Section("inputs", "Dispersed inputs", as_blocks([*note_paragraphs(campaign), inputs])),
         Section("provenance", "Provenance", (origin_table("estimate", name, record.record, _asked(record)),)),
         Section("reading", "Glossary", (GLOSSARY,)),
     )

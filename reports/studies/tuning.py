@@ -18,6 +18,7 @@ from reports.drawing.marks import Axis, Drawing, Line, Plot, stepped
 from reports.drawing.palette import BLUE
 from reports.figures.fronts import candidates_beyond, front_figure
 from reports.sections.figure_blocks import POINTS_SHOWN, thinned_rows
+from reports.sections.scenario import note_paragraphs
 from reports.studies.tuned import Tuned, inside, limit_words, metric_words, quantile_words
 from reports.studies.tuning_tables import (
     front_table,
@@ -67,7 +68,7 @@ def build_tuning(record: TuningRecord, name: str) -> Document:
         Section("front", "The front", as_blocks(_front_blocks(tuned))),
         Section("published", "Validation against published results", as_blocks([published_table(tuned)])),
         Section("convergence", "Convergence of the search", _progress_blocks(tuned)),
-        Section("question", "Problem", (parameter_table(tuned), measure_table(tuned))),
+        Section("question", "Problem", as_blocks(_question_blocks(tuned))),
         Section("inputs", "Other inputs", as_blocks(input_tables(tuned))),
         Section("provenance", "Provenance", (provenance_table(tuned),)),
         Section("reading", "Glossary", (GLOSSARY,)),
@@ -212,6 +213,12 @@ def _front_figure(tuned: Tuned) -> FigureBlock:
 
 
 # ---- the search and the question
+
+
+def _question_blocks(tuned: Tuned) -> Iterator[Table | str]:
+    yield from note_paragraphs(tuned.manifest["campaign"])
+    yield parameter_table(tuned)
+    yield measure_table(tuned)
 
 
 def _progress_blocks(tuned: Tuned) -> tuple[Block, ...]:

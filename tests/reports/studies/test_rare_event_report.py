@@ -12,7 +12,7 @@ from mc_engine.store.parts import Column
 from mc_engine.store.result_folder import write_result
 from mc_engine.store.run_files import RARE_EVENT
 from mc_engine.studies.rare_event_folder import open_rare_event, probability_words, rare_event_lines
-from reports.document.blocks import FigureBlock, Table, blocks_of
+from reports.document.blocks import FigureBlock, Table, Text, blocks_of
 from reports.drawing import screen
 from reports.studies.rare_events import build_rare_event
 
@@ -124,6 +124,14 @@ def test_without_a_failed_case_the_report_says_below(tmp_path):
     assert document.costs == ()  # there is no standard error of nothing
     assert "add up" not in repr(document.sections[0])
     assert not list(blocks_of(document, FigureBlock))
+
+
+def test_the_note_of_the_campaign_is_told_with_the_inputs(tmp_path):
+    record = estimated(tmp_path)
+    campaign = {**record.record["campaign"], "note": "Tanks of May.\n\nNot weighed.\n"}
+    document = build_rare_event(replace(record, record={**record.record, "campaign": campaign}), "toy")
+    (inputs,) = [section for section in document.sections if section.anchor == "inputs"]
+    assert inputs.blocks[:2] == (Text(("Tanks of May.",)), Text(("Not weighed.",)))
 
 
 def test_page_and_paper_are_written_and_names_stay_text(tmp_path):

@@ -10,7 +10,7 @@ from synthetic_tuning import synthetic_tuning
 
 import reports
 from mc_engine.studies.tuning_folder import UNFINISHED, tuning_lines
-from reports.document.blocks import FigureBlock, Table, blocks_of
+from reports.document.blocks import FigureBlock, Table, Text, blocks_of
 from reports.drawing import paper, screen
 from reports.drawing.marks import Points
 from reports.formats.html import render_html
@@ -144,6 +144,13 @@ def test_failed_cases_are_told(tmp_path):
         "90 candidates had cases that failed; each of these takes the worst rank. Most often, with 90 candidates: "
         "refused: too far.",
     )
+
+
+def test_the_note_of_the_campaign_is_told_with_the_problem(record):
+    campaign = {**record.manifest["campaign"], "note": "Wheels of May.\n\nNot weighed.\n"}
+    document = build_tuning(replace(record, manifest={**record.manifest, "campaign": campaign}), "out")
+    (problem,) = [section for section in document.sections if section.anchor == "question"]
+    assert problem.blocks[:2] == (Text(("Wheels of May.",)), Text(("Not weighed.",)))
 
 
 def test_one_candidate_is_counted_as_one(tmp_path):
