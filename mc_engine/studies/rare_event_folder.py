@@ -104,8 +104,10 @@ def plain_cases(result: dict[str, Any]) -> float:
 
 
 def accepted_percent(level: dict[str, Any]) -> str:
-    """The accepted fraction of a level in whole percent."""
-    return f"{100.0 * level['accepted']:.0f}"
+    """The accepted fraction of a level in whole percent; only what is exactly 0 or 1 is printed as 0 or 100."""
+    accepted = level["accepted"]
+    percent = f"{100.0 * accepted:.0f}"
+    return {"0": "< 1", "100": "> 99"}.get(percent, percent) if 0.0 < accepted < 1.0 else percent
 
 
 def _level_lines(result: dict[str, Any]) -> Iterator[str]:

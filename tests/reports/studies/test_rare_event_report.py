@@ -163,7 +163,10 @@ def test_failed_cases_are_a_scatter_of_the_two_inputs_they_lie_farthest_in(tmp_p
 
 
 def test_command_line_and_report_round_the_accepted_fraction_alike(tmp_path):
-    record = estimated(tmp_path / "out", levels=[{**level(None, 1.0), "accepted": 0.568}])
+    accepted = {1.0: "100", 0.996: "> 99", 0.568: "57", 4e-3: "< 1", 0.0: "0"}
+    levels = [{**level(None, 1.0), "accepted": fraction} for fraction in accepted]
+    record = estimated(tmp_path / "out", levels=levels)
     (table,) = [one for one in blocks_of(build_rare_event(record, "out"), Table) if one.caption == "Levels"]
-    assert table.rows[0][-1].text == "57\u202f%"
-    assert any(line.endswith("57 %") for line in rare_event_lines(record.result))
+    assert [row[-1].text for row in table.rows] == [f"{percent}\u202f%" for percent in accepted.values()]
+    for percent in accepted.values():
+        assert any(line.endswith(f" {percent} %") for line in rare_event_lines(record.result))
