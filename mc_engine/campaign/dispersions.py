@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.campaign.distribution_keys import DispersionContext, build_distribution, checked_values
+from mc_engine.campaign.distribution_keys import DispersionContext, build_distribution, checked_values, refuse_no_spread
 from mc_engine.campaign.inputs import about, check_value, number, within_rounding
 from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.sections import DISTRIBUTIONS, DispersionSection
@@ -148,6 +148,7 @@ def _equal_steps(context: DispersionContext, distribution: Distribution | None) 
     span = _span(context, distribution)
     if span is None:
         return ()
+    refuse_no_spread(*span, context.findings)
     for value in span:
         check_value(value, context.item, context.findings, "")
     # One dispersion at a time goes to its low and its high end unless more is asked for.

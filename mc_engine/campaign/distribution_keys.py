@@ -63,11 +63,19 @@ def build_distribution(context: DispersionContext) -> Distribution | None:
     distribution = _BUILDERS[context.keys.dist](context)
     if distribution is None or len(context.findings.problems) > before:
         return None
+    if not isinstance(distribution, Discrete | Empirical | Constant):
+        refuse_no_spread(*distribution.span, context.findings)
     if isinstance(distribution, Continuous):
         distribution = _truncated(distribution, context)
     if distribution is not None and isinstance(context.item, Parameter):
         distribution = _inside_parameter_range(distribution, context)
     return distribution
+
+
+def refuse_no_spread(low: float, high: float, findings: Findings) -> None:
+    """Note a spread that is lost in the rounding of the numbers that it surrounds."""
+    if low == high:
+        findings.add("", f"the spread is too small for the digits of {number(low)}: all values would be equal")
 
 
 def _truncated(distribution: Continuous, context: DispersionContext) -> Continuous | Truncated | None:

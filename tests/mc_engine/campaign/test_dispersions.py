@@ -103,6 +103,9 @@ MISTAKES = [
     ('dist = "discrete"\nvalues = []', "values", "0 given; at least 1 needed"),
     ('dist = "constant"\nvalue = true', "value", "true is not a number; height_km is Height [km]"),
     ('dist = "normal"\nsigma = 1\nlevels = 5', "levels", NO_LEVELS),
+    *((f'dist = "{body}', "", f"the spread is too small for the digits of {centre}: all values would be equal")
+      for body, centre in [('normal"\nmean = 1e30\nsigma = 1', "1e+30"), ('lognormal"\nlog_sigma = 1e-20', "10"),
+                           ('uniform"\nhalf_range = 1e-20', "10"), ('exponential"\nscale = 1e-20', "10")]),
     ("sigma = 1", "sigma", 'is a key of "normal", "lognormal"; dist is missing'),
     ("value = 4", "value", 'is a key of "constant"; dist is missing'),
 ]  # fmt: skip
@@ -131,6 +134,8 @@ MISTAKES_OF_AXES = [
     ("levels = 3", "", "needs lower and upper, or half_range, or three_sigma, and only one of these"),
     ("levels = 3\nlower = 1", "", "needs lower and upper, or half_range, or three_sigma, and only one of these"),
     ("levels = 3\nlower = 2\nupper = 1", "lower", "2 is not below upper = 1"),
+    ("levels = 3\nhalf_range = 1e-20", "",
+     "the spread is too small for the digits of 10: all values would be equal"),
     ("levels = 1\nhalf_range = 1", "levels", "1 is not allowed; it must be at least 2"),
     ("levels = 3\nvalues = [1]", "levels", "there are values already; give one of the two"),
     ("values = [true]", "values 1", "true is not a number; height_km is Height [km]"),
