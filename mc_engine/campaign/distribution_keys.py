@@ -205,7 +205,8 @@ def _discrete(context: DispersionContext) -> Distribution | None:
     elif not sum(weights) >= 1.0 / LARGEST:
         context.findings.add("weights", "are too small" if any(weights) else "are all zero")
     elif None not in values:
-        return Discrete(tuple(value for value in values if value is not None), tuple(weights))
+        drawn = [(value, weight) for value, weight in zip(values, weights, strict=True) if value is not None and weight]
+        return Discrete(*zip(*drawn, strict=True))  # a grid has no level of weight 0
     return None
 
 

@@ -180,6 +180,7 @@ def test_a_grid_takes_values_or_equal_steps_between_bounds():
         ('dist = "normal"\nsigma = 1\nlower = 9\nupper = 12\nlevels = 2', (9.0, 12.0)),
         ('dist = "uniform"\nhalf_range = 1\nlevels = 2', (9.0, 11.0)),
         ('dist = "discrete"\nvalues = [3, 4]', (3.0, 4.0)),
+        ('dist = "discrete"\nvalues = [3, 4, 5]\nweights = [1, 0, 2]', (3.0, 5.0)),
         ('dist = "constant"\nvalue = 3', (3.0,)),
     ]:
         assert levels(body) == pytest.approx(expected)
