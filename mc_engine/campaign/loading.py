@@ -80,7 +80,6 @@ class Campaign:
     upstream : Upstream or None, the run that inputs are taken from
     first : Campaign or None, the campaign of that run, if it has yet to be flown
     looks : tuple of int, numbers of cases at which `run --until verdict` makes interim analyses; empty for other runs
-    messages : tuple of str, files of orbit messages from which covariances were read
     files : dict, path to SHA-256, the tables and orbit messages as they were read
     sensitivity : SensitivityDesign or None, the section [sensitivity]
     report : ReportSection, probability and confidence of the statistics in the report
@@ -115,7 +114,6 @@ class Campaign:
     upstream: "Upstream | None" = field(default=None, compare=False, repr=False)
     first: "Campaign | None" = field(default=None, compare=False, repr=False)
     looks: tuple[int, ...] = ()
-    messages: tuple[str, ...] = ()
     files: Mapping[Path, str] = field(default_factory=dict, compare=False, repr=False)
     sensitivity: SensitivityDesign | None = None
     report: ReportSection = field(default_factory=ReportSection)
@@ -255,7 +253,6 @@ def _assemble(
         tuning=tuning,
         upstream=upstream,
         first=first,
-        messages=messages,
         files=files,
         sensitivity=sensitivity,
         report=sections.report or ReportSection(),
