@@ -33,6 +33,8 @@ _EACH_CASE = (
     "Python cannot decide, count or look up by a number that differs from case to case; use where(condition, a, b), "
     "minimum, maximum, rint or look_up of mc_engine.lanes, & and | between conditions, and loops of a fixed number"
 )
+_CONDITION = "a condition stands where a number must; join conditions with & | ^, or write where(condition, 1.0, 0.0)"
+_OF_A_MASK = re.compile(r"built-in function \w+>\) found for signature:\s+>>> \w+\(.*\blanes_m\d")
 # How NumPy and Python complain of an array of cases where they take a single number.
 _OF_ARRAYS = re.compile(
     "truth value of an array|integer scalar arrays|interpreted as an integer|only (length-1|0-dimensional) arrays|"
@@ -99,7 +101,7 @@ def _hint_of_module(error: Exception) -> str:
 def fault_of_trial(error: Exception) -> str:
     """The same, of physics that was called with arrays of cases."""
     frame, line = frame_in_model(error)
-    text = " ".join(str(error).split())
+    text = " ".join(str(error).split()).rstrip(".")
     if _OF_ARRAYS.search(text):
         text = f"{_of_math(frame, line) if isinstance(error, TypeError) else ''}{_EACH_CASE}"
     elif left_out := _LEFT_OUT.match(text):
@@ -128,6 +130,8 @@ def _hint_of_error(error: Exception) -> str:
         return "; give it a value on a line above, whichever way an `if` goes"
     if "'bitwise_" in text or "for &" in text or "for |" in text:
         return "; & and | join conditions, each in parentheses: (a > b) & (c > d)"
+    if "numpy boolean" in text:
+        return f"; {_CONDITION}"
     if "could not be broadcast" in text:
         return "; a tuple is no number: give its parts names, as in n1, n2 = normal_pair(draws, 0)"
     if not isinstance(error, NameError):
@@ -282,6 +286,7 @@ def _compiler_fault(text: str) -> tuple[str, str]:
             "Intrinsic in ", "With argument", "Rejected as", "TypingError: Failed in")  # fmt: skip
     telling = (line for line in lines if line and not line.startswith(idle) and "<intrinsic " not in line)
     words = re.sub(r" at 0x\w+|(?<=\s)(?:[A-Za-z]:)?[/\\]\S*[/\\]", "", next(telling, "no reason given"))
+    words = _CONDITION if _OF_A_MASK.search(text) else words
     return source_place(file, number) if file else "", f"kernels cannot run this ({words.rstrip(':.')}); {PHYSICS}"
 
 
