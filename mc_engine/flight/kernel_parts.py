@@ -119,7 +119,7 @@ def _with_phase(model: Model, name: str) -> Any:
     function, declared = getattr(model, name), model.quantities if name == "observe" else model.metrics
     if not model.phases:
         return function
-    arguments = ARGUMENTS[name].split(", ")
+    arguments = ARGUMENTS[name]
     picks: list[Pick] = [("result", 0, i) for i in range(len(declared))]
     picks.append(("argument", arguments.index("m"), PHASE))
     return ComposedFunction([(function, whole(range(len(arguments))))], tuple, picks, function)
@@ -208,7 +208,7 @@ def _tracked(
 # ---- to check that each event can occur: their times are kept in the discrete state, behind that of the model
 
 _OWN, _NAN = "own", float("nan")
-_TIME, _MEMORY, _HIT = (ARGUMENTS["note"].split(", ").index(name) for name in ("t", "m", "hit"))
+_TIME, _MEMORY, _HIT = (ARGUMENTS["note"].index(name) for name in ("t", "m", "hit"))
 
 
 def watching_events(model: Model) -> Model:
@@ -243,7 +243,7 @@ def watching_events(model: Model) -> Model:
 
 def _own_call(name: str, function: Callable[..., Any]) -> Call:
     """A call of a function of the model, with its own discrete state."""
-    picks = list(whole(range(len(ARGUMENTS[name].split(", ")))))
+    picks = list(whole(range(len(ARGUMENTS[name]))))
     picks[_MEMORY] = ("argument", _MEMORY, _OWN)
     return function, tuple(picks)
 

@@ -251,8 +251,7 @@ def _refuse_idle_events(events: Mapping[str, Event], switch: Any, parameters: tu
 
 def _called(name: str, function: Any, kept: Memory) -> Any:
     """The function as the engine calls it, with all arguments of `name` in their order."""
-    given = ARGUMENTS[name].split(", ")
-    if not callable(function) or list(inspect.signature(function).parameters) == given:
+    if not callable(function) or tuple(inspect.signature(function).parameters) == ARGUMENTS[name]:
         return function  # what is no function, `source_faults` tells
     called, picks = _call(name, f"`{name}`", function, kept)
     return ComposedFunction([(called, picks)], written=function)
@@ -260,7 +259,7 @@ def _called(name: str, function: Any, kept: Memory) -> Any:
 
 def _call(name: str, what: str, function: Any, kept: Memory) -> Call:
     """A function and what it takes of the arguments of `name`; ModelError for an argument that there is not."""
-    given = ARGUMENTS[name].split(", ")
+    given = ARGUMENTS[name]
     known = {**{word: word for word in given}, **{word: short for word, short in _LONG.items() if short in given}}
     in_phase = ["since", "phase"] if kept.phases and {"t", "m"} <= {*given} else []
     calls: list[Call] = []
@@ -352,11 +351,11 @@ def _metrics(metrics: Any, outputs: Any, observe: Any, evaluate: Any, places: Ma
     if evaluate is not None and not callable(evaluate):
         return evaluate
     outputs_by_name = {item.name: item.symbol for item in outputs.declared}
-    arguments = ARGUMENTS["evaluate"].split(", ")
+    arguments = ARGUMENTS["evaluate"]
     picks: list[Pick] = []
     calls: list[Call] = [] if evaluate is None else [_call("evaluate", "`evaluate`", evaluate, kept)]
     if any(metric.source == "end" and metric.output != _TIME.name for metric in metrics.computed.values()):
-        calls.append((observe, whole(range(len(ARGUMENTS["observe"].split(", "))))))
+        calls.append((observe, whole(range(len(ARGUMENTS["observe"])))))
     for item in metrics.declared:
         metric = metrics.computed.get(item.name)
         if metric is None:

@@ -25,17 +25,17 @@ from mc_engine.model.syntax_tree import repeated, tree_of_file
 
 # The arguments that the engine hands to each function of a model.
 ARGUMENTS = {
-    "initial": "p, o",
-    "start": "p, o",
-    "rhs": "t, s, m, p, o",
-    "control": "t, s, m, p, o, draws",
-    "events": "t, s, m, p, o",
-    "switch": "t, s, m, p, o, hit",
-    "observe": "t, s, m, p, o",
-    "evaluate": "t, s, m, p, o, best, when",
-    "note": "t, s, m, p, o, hit",  # the engine's own, of `observe`, which is known by its own name
-    "prepare": "inputs, settings, refusals",
-    "tables": "o",
+    "initial": ("p", "o"),
+    "start": ("p", "o"),
+    "rhs": ("t", "s", "m", "p", "o"),
+    "control": ("t", "s", "m", "p", "o", "draws"),
+    "events": ("t", "s", "m", "p", "o"),
+    "switch": ("t", "s", "m", "p", "o", "hit"),
+    "observe": ("t", "s", "m", "p", "o"),
+    "evaluate": ("t", "s", "m", "p", "o", "best", "when"),
+    "note": ("t", "s", "m", "p", "o", "hit"),  # the engine's own, of `observe`, which is known by its own name
+    "prepare": ("inputs", "settings", "refusals"),
+    "tables": ("o",),
 }
 INTERPRETED = ("prepare", "tables")  # NumPy, a whole chunk at a time
 
@@ -148,10 +148,10 @@ def _wrong_functions(model: Model) -> Iterator[str]:
                 yield f"{place_of(function)}: {_unmarked(called)}"
             continue
         try:
-            inspect.signature(function).bind(*wanted.split(", "))
+            inspect.signature(function).bind(*wanted)
         except TypeError:
             given = ", ".join(inspect.signature(function).parameters) or "nothing"
-            yield f"{place_of(function)}: `{called}` takes ({given}); the engine gives it ({wanted})"
+            yield f"{place_of(function)}: `{called}` takes ({given}); the engine gives it ({', '.join(wanted)})"
 
 
 def _repeated(model: Model) -> Iterator[str]:
