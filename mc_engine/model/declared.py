@@ -22,7 +22,7 @@ from mc_engine.model.fields import AdaptiveStep, Event, Extremum, Field, FixedSt
 from mc_engine.model.figures import Figure
 from mc_engine.model.phases import Memory, Phase, checked_events, events_of, noted_field, record_class
 from mc_engine.model.preparation import MISUSES, misuse
-from mc_engine.model.reading import ARGUMENTS
+from mc_engine.model.reading import ARGUMENTS, code_of
 from mc_engine.model.record import Model, Refusals
 from mc_engine.suggestions import hint, nearest
 from mc_engine.units import UNITS, compatible, units_at_the_end
@@ -264,22 +264,20 @@ def _call(name: str, what: str, function: Any, kept: Memory) -> Call:
     in_phase = ["since", "phase"] if kept.phases and {"t", "m"} <= {*given} else []
     calls: list[Call] = []
     chosen: list[Pick] = []
-    taken = [*inspect.signature(function).parameters]
-    for argument in inspect.signature(function).parameters.values():
-        if known.get(argument.name) in {*taken} - {argument.name}:
-            raise ModelError(
-                f'{what} takes "{known[argument.name]}" and "{argument.name}", which are the same; take one'
-            )
-        if argument.name in known:
-            chosen.append(("argument", given.index(known[argument.name]), ""))
-        elif argument.name in in_phase:
-            chosen.append(kept.handed(calls, argument.name, *map(given.index, "tm")))
+    taken = inspect.signature(function).parameters
+    for argument in taken:
+        if known.get(argument) in {*taken} - {argument}:
+            raise ModelError(f'{what} takes "{known[argument]}" and "{argument}", which are the same; take one')
+        if argument in known:
+            chosen.append(("argument", given.index(known[argument]), ""))
+        elif argument in in_phase:
+            chosen.append(kept.handed(calls, argument, *map(given.index, "tm")))
         else:
-            code = getattr(inspect.unwrap(getattr(function, "function", function)), "__code__", None)
+            code = code_of(function)
             where = f" in line {code.co_firstlineno}" if code else ""
-            near = nearest(argument.name, [*known, *in_phase])
+            near = nearest(argument, [*known, *in_phase])
             meant = f'; did you mean "{near}"?' if near else ""
-            raise ModelError(f'{what}{where} takes "{argument.name}"{meant}; a function takes what it names of '
+            raise ModelError(f'{what}{where} takes "{argument}"{meant}; a function takes what it names of '
                              f"{', '.join([*given, *in_phase])}")  # fmt: skip
     if not calls:
         return function, tuple(chosen)
