@@ -74,7 +74,7 @@ def why_no_stop(campaign: Campaign) -> str:
     for event in usual:
         if carried := _carried(model, event, looks):
             return f"no stopping event happens before the time limit: {carried}; {_DECIDED}"
-        if other := _other_way(model, event, looks):
+        if other := _other_way(event, looks):
             return f"no stopping event happens before the time limit: {other}; {_mended(event)}"
     if not delayed.keys() & {*stops}:
         happens, look_at = "crosses zero", "its direction"
@@ -141,7 +141,7 @@ def _never_happens(model: Model, event: Event, looks: Looks, n_cases: int) -> st
     """The sentence on an event; "" where a flight without phases comes to its zero, such as one that ends there."""
     if carried := _carried(model, event, looks):
         return f"{carried}; {_DECIDED}, or declare it with rare=True if it is for unusual cases"
-    if other := _other_way(model, event, looks):
+    if other := _other_way(event, looks):
         return (f"{other}, in which it happens in none of {n_cases} cases; {_mended(event)}, or declare it with "
                 "rare=True if it is for unusual cases")  # fmt: skip
     sizes = [np.abs(look[event.name]) for look in looks.values()]
@@ -157,13 +157,13 @@ def _never_happens(model: Model, event: Event, looks: Looks, n_cases: int) -> st
             "the function, or declare it with rare=True if it is for unusual cases")  # fmt: skip
 
 
-def _other_way(model: Model, event: Event, looks: Looks) -> str:
+def _other_way(event: Event, looks: Looks) -> str:
     """Where an event's function crosses zero against the event's direction, and in that never; "" if nowhere."""
     for who, look in looks.items():
         own, t = (_time_of_crossing(look["t_s"], look[event.name], way)
                   for way in (event.direction, _OTHER.get(event.direction, "")))  # fmt: skip
         if np.isnan(own) and not np.isnan(t):
-            return (f'{_place(model, event)}: the event "{event.name}" crosses zero {_OTHER[event.direction]} at '
+            return (f'{_place(event)}: the event "{event.name}" crosses zero {_OTHER[event.direction]} at '
                     f'{t:.4g} s in {who}, but its direction is "{event.direction}"')  # fmt: skip
     return ""
 
@@ -178,7 +178,7 @@ def _carried(model: Model, event: Event, looks: Looks) -> str:
         jumps = np.flatnonzero((t[1:] == t[:-1]) & (values[:-1] < 0.0) & (values[1:] >= 0.0))
         if jumps.size:
             return (
-                f'{_place(model, event)}: the event "{event.name}" does not happen where a sample of the control, '
+                f'{_place(event)}: the event "{event.name}" does not happen where a sample of the control, '
                 f"`switch` or the beginning of a phase carries it over zero, at {t[jumps[0]]:.4g} s in {who}"
             )
     return ""
@@ -190,7 +190,7 @@ def _time_of_crossing(t: np.ndarray, values: np.ndarray, direction: str) -> floa
     Between rows of one time nothing is crossed: they are before and after a sample, a switch or the beginning of a
     phase.
     """
-    sign = {"rising": 1.0, "falling": -1.0}.get(direction, 0.0)
+    sign = DIRECTIONS.get(direction, 0.0)
     before, after = sign * values[:-1], sign * values[1:]
     crossed = np.flatnonzero((t[1:] > t[:-1]) & (before < 0.0) & (after >= 0.0))
     if not crossed.size:
@@ -203,7 +203,7 @@ def _mended(event: Event) -> str:
     return f'give it the direction "{_OTHER[event.direction]}" or "either", or its function the other sign'
 
 
-def _place(model: Model, event: Event) -> str:
+def _place(event: Event) -> str:
     """The line on which an event is declared in the file of its function, or else that of the function."""
     code = code_of(event.function)
     file = code.co_filename if code else ""
