@@ -7,37 +7,34 @@ case.  `mc_engine.flight.contract_flight` makes the checks that need a flight.
 import json
 import subprocess
 import warnings
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import EngineError, ModelError
+from mc_engine.flight.flyer import Process
+from mc_engine.flight.repeatability import model_digests, nominal_inputs
 from mc_engine.model.faults import MORE
 from mc_engine.model.reading import is_shipped, source_faults
 from mc_engine.model.record import compiled_model
 from mc_engine.model.trial import run_through
 
-if TYPE_CHECKING:
-    from mc_engine.campaign.loading import Campaign
-
 _PATIENCE = 600.0  # s, for all flights and compilation; one case has a limit of its own
 
 
-def breaches(campaign: "Campaign") -> list[str]:
+def breaches(campaign: Campaign) -> list[str]:
     """One sentence for each error in the campaign's model that is found without compiling; empty if there is none."""
     return source_faults(compiled_model(campaign.model)) or _trial_faults(campaign)
 
 
-def refuse_breaches(campaign: "Campaign") -> None:
+def refuse_breaches(campaign: Campaign) -> None:
     """ModelError with the first breach, before anything of a campaign is flown or written."""
     sentences = _trial_faults(campaign) if is_shipped(compiled_model(campaign.model)) else breaches(campaign)
     if sentences:
         raise ModelError(f"{sentences[0]}{MORE}")
 
 
-def _trial_faults(campaign: "Campaign") -> list[str]:
-    from mc_engine.flight.repeatability import nominal_inputs
-
+def _trial_faults(campaign: Campaign) -> list[str]:
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
@@ -48,10 +45,8 @@ def _trial_faults(campaign: "Campaign") -> list[str]:
     return []
 
 
-def flight_faults(campaign: "Campaign", process: "subprocess.Popen[str]") -> list[str]:
+def flight_faults(campaign: Campaign, process: Process) -> list[str]:
     """What `process`, one of `mc_engine.flight.contract_flight` that waits, finds in flights of a few cases."""
-    from mc_engine.flight.repeatability import model_digests
-
     try:
         out, errors = process.communicate(json.dumps(model_digests(campaign)), timeout=_PATIENCE)
     except subprocess.TimeoutExpired:
