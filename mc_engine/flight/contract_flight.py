@@ -32,8 +32,8 @@ from mc_engine.flight.repeatability import (
     influences,
     model_digests,
     nominal_inputs,
+    not_repeating,
     note_environment,
-    other_bits,
     results,
 )
 from mc_engine.garbage_collection import collect_rarely
@@ -75,7 +75,7 @@ def faults(campaign: Campaign) -> list[str]:
         lost = _too_long(campaign, nominal) or not_finite(campaign, inputs, ids, flown, nominal)
         faults_of_flight = [
             *(lost or _none_completing(campaign, flown, nominal)),
-            *other_bits(campaign, inputs, ids, flown),
+            *not_repeating(campaign, inputs, ids, flown),
         ]
         faults_of_flight = faults_of_flight or _passed_over(campaign, inputs, ids, flown)
         return faults_of_flight or [

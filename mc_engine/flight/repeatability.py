@@ -126,7 +126,7 @@ def results(
     return fly(compiled_model(campaign.model), inputs, ids, campaign.seed, folder=campaign.directory, clock=clock)
 
 
-def other_bits(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, flown: Columns) -> Iterator[str]:
+def not_repeating(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, flown: Columns) -> Iterator[str]:
     """One sentence if the same cases come out differently a second time, or among other cases."""
     why = "a case must depend on its inputs and case_id alone: no global state, clock or numpy.random"
     again = first_difference(flown, results(campaign, inputs, ids))
