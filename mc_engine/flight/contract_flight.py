@@ -22,12 +22,11 @@ from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.errors import EngineError
 from mc_engine.flight.compiled import CompiledFlyer
-from mc_engine.flight.flyer import NOMINAL_NOISE
+from mc_engine.flight.flyer import NOMINAL_NOISE, Columns
 from mc_engine.flight.kernel import FINER_STEPS, clock_number, finer, grid_of
 from mc_engine.flight.lost_numbers import first_lost, may_be_lost, not_finite
 from mc_engine.flight.missing_events import events_that_never_happen, why_no_stop
 from mc_engine.flight.repeatability import (
-    Columns,
     first_difference,
     influences,
     model_digests,

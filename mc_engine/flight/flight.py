@@ -9,7 +9,7 @@ import numpy as np
 
 from mc_engine.campaign.columns import END_PHASE, END_TIME
 from mc_engine.errors import ModelError
-from mc_engine.flight.flyer import phase_words, status_words
+from mc_engine.flight.flyer import Columns, phase_words, status_words
 from mc_engine.flight.kernel import Builder, adaptive_arguments, build_kernel, fixed_arguments, grid_of, usual_width
 from mc_engine.flight.kernel_parts import blocks_of, settings_class
 from mc_engine.lanes.kernel_data import gathered
@@ -39,7 +39,7 @@ def fly(
     width: int | None = None,
     clock: FixedStep | AdaptiveStep | None = None,
     build: Builder | None = None,
-) -> dict[str, np.ndarray]:
+) -> Columns:
     """Results of some cases as columns: status, reason, `end_...` states and metrics in declared units.
 
     case_ids : int64[n], which address the noise.  Cases with different settings may be mixed.
@@ -65,7 +65,7 @@ def _unflown(model: Model, refusals: Refusals) -> tuple[np.ndarray, ...]:
     return time, np.where(refusals.mask, REFUSED, OK).astype(np.float64), states, metrics
 
 
-def _columns(model: Model, refusals: Refusals, out: tuple[np.ndarray, ...]) -> dict[str, np.ndarray]:
+def _columns(model: Model, refusals: Refusals, out: tuple[np.ndarray, ...]) -> Columns:
     """Results as columns.  out : time, status, states and metrics as kernels give them; NaN for refused cases."""
     for numbers in out:
         numbers[np.isnan(numbers)] = np.nan  # processors and cards give it different signs
@@ -223,9 +223,7 @@ def fly_interpreted(
     return out
 
 
-def fly_history(
-    model: Model, inputs: Inputs, case_id: int, seed: int, **options: Any
-) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+def fly_history(model: Model, inputs: Inputs, case_id: int, seed: int, **options: Any) -> tuple[Columns, Columns]:
     """(columns, history) of one case, with the options of `fly_histories`."""
     return next(fly_histories(model, inputs, np.array([case_id]), seed, **options))
 
@@ -239,7 +237,7 @@ def fly_histories(
     folder: Path | None = None,
     width: int | None = None,
     rows: int = 1500,
-) -> Iterator[tuple[dict[str, np.ndarray], dict[str, np.ndarray]]]:
+) -> Iterator[tuple[Columns, Columns]]:
     """(columns, history) of each case, in their order.  When one is asked for, as many as there are lanes fly together.
 
     Their bits do not depend on the width or on the cases that fly together.
@@ -256,7 +254,7 @@ def fly_histories(
     groups = [np.split(group, range(width, group.size, width)) for group in _groups_by_settings(ready)]
     batch_of = {int(place): batch for batches in groups for batch in batches for place in batch}
     recorder = _Recorder(model, ready, case_ids, seed, folder, width, rows)
-    flown: dict[int, tuple[dict[str, np.ndarray], np.ndarray]] = {}
+    flown: dict[int, tuple[Columns, np.ndarray]] = {}
     for place in range(len(case_ids)):
         if place not in batch_of:
             refusals = Refusals(ready.refusals.reason[[place]])
@@ -295,7 +293,7 @@ class _Recorder:
         self._n_fields = 1 + self._factors.size + bool(model.phases)
         self._history = np.empty((0, 0))
 
-    def flown(self, chosen: np.ndarray) -> Iterator[tuple[dict[str, np.ndarray], np.ndarray]]:
+    def flown(self, chosen: np.ndarray) -> Iterator[tuple[Columns, np.ndarray]]:
         """(columns, history) of each case.  history : float64[1 + n_quantities, n_kept], in declared units.
 
         chosen : indices of cases that can start, of one settings, as many as there are lanes or fewer.
@@ -360,7 +358,7 @@ class _Recorder:
 # ---- chosen inputs, all others at the model's own values: for studies that no campaign file describes
 
 
-def chosen_cases(model: Model, inputs: Inputs, *, seed: int = 0) -> dict[str, np.ndarray]:
+def chosen_cases(model: Model, inputs: Inputs, *, seed: int = 0) -> Columns:
     """Columns of as many cases as the longest input has values, in declared units.
 
     ValueError names the inputs that the model does not have.
@@ -374,7 +372,7 @@ def chosen_case(model: Model, inputs: Inputs, *, seed: int = 0) -> dict[str, Any
     return {name: column[0] for name, column in chosen_cases(model, inputs, seed=seed).items()}
 
 
-def chosen_history(model: Model, inputs: Inputs, *, rows: int = 2001, seed: int = 0) -> dict[str, np.ndarray]:
+def chosen_history(model: Model, inputs: Inputs, *, rows: int = 2001, seed: int = 0) -> Columns:
     """`t_s` and the model's outputs along the flight of one case; rows as in `fly_history`."""
     return fly_history(model, _complete(model, inputs), 0, seed, rows=rows)[1]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mc_engine.campaign.loading import Campaign
 from mc_engine.flight.flight import fly_interpreted
-from mc_engine.flight.flyer import NOMINAL_NOISE
+from mc_engine.flight.flyer import NOMINAL_NOISE, Columns
 from mc_engine.lanes.number import Origin
 from mc_engine.model.faults import is_the_users, origin_sentence, place_in_model
 from mc_engine.model.record import Model, compiled_model
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 PATIENCE_S = 60.0  # of a flight to find the line
 
 
-def may_be_lost(model: Model, flight: Mapping[str, np.ndarray]) -> bool:
+def may_be_lost(model: Model, flight: Columns) -> bool:
     """Whether a flight of one case ended not-finite, or gave a metric that is not a number.  flight : its columns."""
     if flight["status"][0] == STATUS_NAME[OK]:
         return any(not metric.sometimes and bool(np.isnan(flight[metric.name][0])) for metric in model.metrics)
@@ -56,8 +56,8 @@ def not_finite(
     campaign: Campaign,
     inputs: Mapping[str, Any],
     ids: np.ndarray,
-    flown: Mapping[str, np.ndarray],
-    nominal: Mapping[str, np.ndarray],
+    flown: Columns,
+    nominal: Columns,
 ) -> list[str]:
     """One sentence with the line of the model if a flight ended not-finite: the nominal one, or the first of these."""
     word = STATUS_NAME[NOT_FINITE]

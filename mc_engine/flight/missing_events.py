@@ -11,10 +11,9 @@ import numpy as np
 
 from mc_engine.campaign.loading import Campaign
 from mc_engine.flight.flight import fly, fly_histories, fly_interpreted
-from mc_engine.flight.flyer import NOMINAL_NOISE
+from mc_engine.flight.flyer import NOMINAL_NOISE, Columns
 from mc_engine.flight.kernel import build_kernel
 from mc_engine.flight.kernel_parts import watching_events
-from mc_engine.flight.repeatability import Columns
 from mc_engine.lanes.kernel_cache import form_of, kept_or_made
 from mc_engine.model.fields import DIRECTIONS, Event
 from mc_engine.model.phases import due_field, noted_field

@@ -17,19 +17,20 @@ import numpy as np
 
 from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import EngineError
-from mc_engine.flight.flight import fly, grid_of, prepare, settings_of
+from mc_engine.flight.flight import fly, settings_of
+from mc_engine.flight.flyer import Columns
+from mc_engine.flight.kernel import grid_of
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model.faults import fault_of
 from mc_engine.model.fields import AdaptiveStep, FixedStep
 from mc_engine.model.imports import PACKAGES, USER
+from mc_engine.model.preparation import prepare
 from mc_engine.model.record import compiled_model
 from mc_engine.model.trial import FEW, Breach
 
 _WHY = "a case must depend on its inputs and case_id alone: no clock, random numbers, hashes or environment"
 _CUT = 5  # cases of the smaller part when they are flown in two
 _read: dict[str, str] = {}  # by environment variable: where the model reads it
-
-Columns = Mapping[str, np.ndarray]
 
 
 def model_digests(campaign: Campaign) -> dict[str, str]:
@@ -121,7 +122,7 @@ def nominal_inputs(campaign: Campaign) -> tuple[Any, Any]:
 
 def results(
     campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, clock: FixedStep | AdaptiveStep | None = None
-) -> dict[str, np.ndarray]:
+) -> Columns:
     """Results of some cases of a campaign.  clock : see `mc_engine.flight.flight.fly`."""
     return fly(compiled_model(campaign.model), inputs, ids, campaign.seed, folder=campaign.directory, clock=clock)
 
