@@ -46,9 +46,20 @@ def fly(
     width : cases at a time, 1, 4, 8 or 16; by default the fastest for the model.
     clock : an integrator of the same class, in place of the model's; the kernel is the same.  build : see `Builder`.
     """
-    width = width or usual_width(model)
+    width, clock = width or usual_width(model), clock or model.clock
     ready = prepare(model, inputs, len(case_ids))
-    fly_group = partial(_fly_group, model, clock or model.clock, ready, case_ids, seed, folder, width, build)
+
+    def fly_group(chosen: np.ndarray) -> tuple[np.ndarray, ...]:
+        n = chosen.size
+        # blocks on a fixed grid are filled up; adaptive lanes take the cases in turn, and want one each to begin with
+        padded = max(n, width) if isinstance(clock, AdaptiveStep) else -(-n // width) * width
+        out = _outputs(model, padded)
+        index: np.ndarray | slice = slice(None)  # all cases, in their order
+        if n < max(padded, len(case_ids)):
+            index = np.concatenate([chosen, np.full(padded - n, chosen[-1])])
+        _bound_kernel(model, clock, folder, width, ready, index, case_ids, seed, out, build=build)()
+        return tuple(numbers[..., :n] for numbers in out)
+
     groups = _groups_by_settings(ready)
     if [group.size for group in groups] == [len(case_ids)]:
         return _columns(model, ready.refusals, fly_group(groups[0]))
@@ -85,11 +96,6 @@ def _columns(model: Model, refusals: Refusals, out: tuple[np.ndarray, ...]) -> C
 def _declared(field: Field, numbers: np.ndarray) -> np.ndarray:
     """Numbers in SI in the unit of their field."""
     return numbers if field.si_factor == 1.0 else numbers / field.si_factor
-
-
-def _n_results(model: Model) -> int:
-    """Numbers that a kernel gives for each case: the metrics, and the last phase of a model with phases."""
-    return len(model.metrics) + bool(model.phases)
 
 
 def _groups_by_settings(ready: Prepared) -> list[np.ndarray]:
@@ -129,30 +135,10 @@ def _kernel_settings(model: Model, codes: np.ndarray, chosen: Any) -> np.ndarray
     return np.concatenate([codes, [np.nan, chosen.tables.size - 1.0], chosen.tables])
 
 
-def _fly_group(
-    model: Model,
-    clock: FixedStep | AdaptiveStep,
-    ready: Prepared,
-    case_ids: np.ndarray,
-    seed: int,
-    folder: Path | None,
-    width: int,
-    build: Builder | None,
-    chosen: np.ndarray,
-) -> tuple[np.ndarray, ...]:
-    n = chosen.size
-    # blocks on a fixed grid are filled up; adaptive lanes take the cases in turn, and want one each to begin with
-    padded = max(n, width) if isinstance(clock, AdaptiveStep) else -(-n // width) * width
-    out = _outputs(model, padded)
-    index: np.ndarray | slice = slice(None)  # all cases, in their order
-    if n < max(padded, len(case_ids)):
-        index = np.concatenate([chosen, np.full(padded - n, chosen[-1])])
-    _bound_kernel(model, clock, folder, width, ready, index, case_ids, seed, out, build=build)()
-    return tuple(numbers[..., :n] for numbers in out)
-
-
 def _outputs(model: Model, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    return np.empty(n), np.empty(n), np.empty((len(model.states), n)), np.empty((_n_results(model), n))
+    """Memory for time, status, states and metrics of n cases; the last phase, if there are any, follows the metrics."""
+    n_results = len(model.metrics) + bool(model.phases)
+    return np.empty(n), np.empty(n), np.empty((len(model.states), n)), np.empty((n_results, n))
 
 
 def _bound_kernel(
