@@ -62,13 +62,13 @@ def not_finite(
     """One sentence with the line of the model if a flight ended not-finite: the nominal one, or the first of these."""
     word = STATUS_NAME[NOT_FINITE]
     bad = np.flatnonzero(flown["status"] == word)
-    own: tuple[Mapping[str, Any], int, str] = campaign.nominal, NOMINAL_NOISE, "the nominal case"
+    row, case_id, who = campaign.nominal, NOMINAL_NOISE, "the nominal case"
     if nominal["status"][0] != word:
         if not bad.size:
             return []
         row = {name: value[bad[0]] if np.ndim(value) else value for name, value in inputs.items()}
-        own = row, int(ids[bad[0]]), f"case {ids[bad[0]]}"
-    sentence = first_lost(compiled_model(campaign.model), own[0], own[1], campaign.seed, own[2])
+        case_id, who = int(ids[bad[0]]), f"case {ids[bad[0]]}"
+    sentence = first_lost(compiled_model(campaign.model), row, case_id, campaign.seed, who)
     return [f"{sentence}; {bad.size} of the first {ids.size} cases end {word}"] if sentence else []
 
 
