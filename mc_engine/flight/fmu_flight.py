@@ -43,19 +43,19 @@ class FmuFlight:
         """Metrics and history of one case.  Raises what fmpy does where the FMU reports an error."""
         import fmpy
 
-        flown = self._fmu
-        metrics = [variable for variable, _, _ in flown.metrics.values()]
-        start = {variable: self._checked(name, inputs[name]) for name, variable in flown.parameters.items()}
+        fmu = self._fmu
+        metrics = [variable for variable, _, _ in fmu.metrics.values()]
+        start = {variable: self._checked(name, inputs[name]) for name, variable in fmu.parameters.items()}
         instance = self._ready()  # after an error it is begun anew
         table = fmpy.simulate_fmu(
             str(self._home),
             start_time=0.0,
-            stop_time=flown.stop_time_s,
-            step_size=flown.step_s,
-            output_interval=flown.step_s,
-            relative_tolerance=flown.solver_tolerance,
+            stop_time=fmu.stop_time_s,
+            step_size=fmu.step_s,
+            output_interval=fmu.step_s,
+            relative_tolerance=fmu.solver_tolerance,
             start_values=start,
-            output=[*metrics, *flown.outputs.values()],
+            output=[*metrics, *fmu.outputs.values()],
             model_description=self._description,
             fmu_instance=instance,
         )
@@ -63,9 +63,9 @@ class FmuFlight:
         time = np.asarray(table["time"])
         history = {variable: np.asarray(table[variable], dtype=np.float64) for variable in table.dtype.names}
         results = {
-            name: taken(time, history[variable], what, level) for name, (variable, what, level) in flown.metrics.items()
+            name: taken(time, history[variable], what, level) for name, (variable, what, level) in fmu.metrics.items()
         }
-        return results, {"t_s": time, **{name: history[variable] for name, variable in flown.outputs.items()}}
+        return results, {"t_s": time, **{name: history[variable] for name, variable in fmu.outputs.items()}}
 
     def _checked(self, name: str, value: float) -> float:
         """The value of a parameter; Refuse for one that the type of its variable would change."""
