@@ -71,9 +71,7 @@ class SimulatorFlyer(Flyer):
         keep: Path | None = None,
         stopped: Callable[[], bool] = never,
     ) -> Columns:
-        n = len(noise)
-        columns = {name: np.broadcast_to(np.asarray(value), n) for name, value in inputs.items()}
-        flight = _Flight(self, columns, noise, keep, stopped, log)
+        flight = _Flight(self, inputs, noise, keep, stopped, log)
         flight.fly()
         return flight.results
 
@@ -149,9 +147,8 @@ class SimulatorFlyer(Flyer):
         ids = np.array([0])
         table = {} if self._campaign.first is not None else case_table(self._campaign, ids)
         nominal = np.array([NOMINAL_NOISE])
-        alone = {name: np.array([value]) for name, value in self._campaign.nominal.items()}
         histories: list[Columns] = []
-        flight = _Flight(self, alone, nominal, None, never, on_history=histories.append)
+        flight = _Flight(self, self._campaign.nominal, nominal, None, never, on_history=histories.append)
         flight.fly()  # starts the process
         begin = time.perf_counter()
         first, dispersed = self._flown(nominal, {})[0], self._flown(ids, table)[0]
@@ -213,11 +210,10 @@ class SimulatorFlyer(Flyer):
         """One sentence if some cases have other results in a batch than each alone, or it fails as a whole."""
         ids = np.arange(min(_TRIED, self._campaign.cases))
         table = {} if self._campaign.first is not None else case_table(self._campaign, ids)
-        inputs = full_inputs(self._campaign, table)
-        columns = {name: np.broadcast_to(np.asarray(value), len(ids)) for name, value in inputs.items()}
-        flight = _Flight(self, columns, ids, None, never)
+        flight = _Flight(self, full_inputs(self._campaign, table), ids, None, never)
         flight.fly()
-        alone = [self.fly({name: column[[k]] for name, column in columns.items()}, ids[[k]]) for k in range(len(ids))]
+        rows = [{name: column[[k]] for name, column in flight.columns.items()} for k in range(len(ids))]
+        alone = [self.fly(row, ids[[k]]) for k, row in enumerate(rows)]
         well = all(row["status"][0] == STATUS_NAME[OK] for row in alone)
         if flight.split and well:
             yield f"a batch of {len(ids)} fails, each of its cases alone does not: {flight.split}"
@@ -250,21 +246,22 @@ class SimulatorFlyer(Flyer):
 class _Flight:
     """The cases of one call.
 
-    results : their columns, filled as cases end.  left_out : columns of the last history.  split : why the first batch
-    failed that was flown again by halves, or empty.
+    columns : their inputs, a value for each case.  results : their columns, filled as cases end.
+    left_out : columns of the last history.  split : why the first batch failed that was flown again by halves, or empty
     """
 
     def __init__(
         self,
         flyer: SimulatorFlyer,
-        columns: Columns,
+        inputs: Inputs,
         noise: np.ndarray,
         keep: Path | None,
         stopped: Callable[[], bool],
         log: RowLog | None = None,
         on_history: Callable[[Columns], None] | None = None,
     ):
-        self._flyer, self._columns, self._noise = flyer, columns, noise
+        self._flyer, self._noise = flyer, noise
+        self.columns: Columns = {name: np.broadcast_to(np.asarray(value), len(noise)) for name, value in inputs.items()}
         self._keep, self._stopped, self._log, self._on_history = keep, stopped, log, on_history
         self.left_out: tuple[str, ...] = ()
         self.split = ""
@@ -276,7 +273,7 @@ class _Flight:
 
     def fly(self) -> None:
         """Fly all cases whose inputs are inside what the simulator accepts."""
-        reasons = self._flyer.refusals(self._columns, len(self._noise))
+        reasons = self._flyer.refusals(self.columns, len(self._noise))
         for place, reason in enumerate(reasons):
             if reason:
                 self._put(place, Flown(REFUSED, reason, {}, {}))
@@ -365,7 +362,7 @@ class _Flight:
             process.end()
             raise RunStopped
         noise, rule = int(self._noise[place]), self._flyer.simulator.keep
-        inputs = {name: column[[place]].tolist()[0] for name, column in self._columns.items()}
+        inputs = {name: column[[place]].tolist()[0] for name, column in self.columns.items()}
         process.end(lambda work: settle(rule, work, folder_name(noise), -1, self._keep, inputs))
         ended = flown(end.status, end.reason)
         self._put(place, ended)
@@ -375,7 +372,7 @@ class _Flight:
             log.close()
 
     def _order(self, places: list[int]) -> Order:
-        columns = {name: column[places] for name, column in self._columns.items()}
+        columns = {name: column[places] for name, column in self.columns.items()}
         keep = None if self._keep is None else str(self._keep.absolute())  # cases may change their folder
         log = None if self._log is None else self._log.at(places)
         return Order(columns, self._noise[places], self._on_history is not None, keep, log)
