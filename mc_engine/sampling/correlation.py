@@ -52,17 +52,15 @@ def correlated(
     return columns
 
 
+def _normal_matrix(rank_matrix: np.ndarray) -> np.ndarray:
+    matrix = normal_correlation(rank_matrix)
+    np.fill_diagonal(matrix, 1.0)  # which the sine gives to the last digits only
+    return matrix
+
+
 def is_positive_definite(rank_matrix: np.ndarray) -> bool:
     """True where normal deviates with these rank correlations exist."""
-    target = normal_correlation(rank_matrix)
-    np.fill_diagonal(target, 1.0)
-    return bool(np.linalg.eigvalsh(target)[0] > _LEAST_EIGENVALUE)
-
-
-def _factor(rank_matrix: np.ndarray) -> np.ndarray:
-    target = normal_correlation(rank_matrix)
-    np.fill_diagonal(target, 1.0)
-    return np.linalg.cholesky(target)
+    return bool(np.linalg.eigvalsh(_normal_matrix(rank_matrix))[0] > _LEAST_EIGENVALUE)
 
 
 def _mix(factor: np.ndarray, columns: list[np.ndarray]) -> list[np.ndarray]:
@@ -80,7 +78,7 @@ def gaussian_copula(u: list[np.ndarray], rank_matrix: np.ndarray) -> list[np.nda
     """Uniform numbers with these rank correlations, from independent ones; each case separately."""
     from scipy.special import ndtr, ndtri
 
-    factor = _factor(rank_matrix)
+    factor = np.linalg.cholesky(_normal_matrix(rank_matrix))
     deviates = [ndtri(np.clip(column, 2.0**-54, 1.0 - 2.0**-53)) for column in u]
     mixed = _mix(factor, deviates)
     # A row without partners before it is left alone: ndtr(ndtri(u)) is u only to the last digits.
@@ -100,7 +98,8 @@ def iman_conover(u: list[np.ndarray], rank_matrix: np.ndarray) -> list[np.ndarra
     ranks = [_ranks(column) for column in u]
     scores = [ndtri((rank + 1.0) / (n_cases + 1.0)) for rank in ranks]
     present = np.linalg.cholesky(_sample_correlation(scores))
-    mixed = _mix(_factor(rank_matrix) @ np.linalg.inv(present), scores)
+    factor = np.linalg.cholesky(_normal_matrix(rank_matrix)) @ np.linalg.inv(present)
+    mixed = _mix(factor, scores)
     return [u[0], *(np.sort(u[k])[_ranks(mixed[k])] for k in range(1, len(u)))]
 
 
