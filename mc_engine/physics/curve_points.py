@@ -137,9 +137,9 @@ def array_of(values: Any, name: str, unit: str | None = None, dimensions: int = 
     return numbers * (1.0 if unit is None else si_factor(name, unit))
 
 
-def refuse_points(words: str, x: np.ndarray, values: np.ndarray, n: int) -> None:
+def refuse_points(words: str, x: np.ndarray, values: np.ndarray) -> None:
     """ModelError unless x rises and there is a finite value, or a row of them, for each."""
-    if x.ndim != 1 or x.size < 2 or values.shape[:1] != (n,):
+    if x.ndim != 1 or x.size < 2 or values.shape[:1] != x.shape:
         sizes = ((x.size, "argument"), (len(values), "value"))
         given = ", ".join(f"{n} {what}{'' if n == 1 else 's'}" for n, what in sizes)
         raise ModelError(f"{words}: {given}; give two or more points, each with a value")

@@ -113,7 +113,7 @@ def curve(
 def _through(xs: np.ndarray, ys: np.ndarray, kind: str, outside: str, path: Path | None) -> Curve:
     """The curve through points in SI.  path : that they come from."""
     words = f"the curve {path.name}" if path else "the curve"
-    refuse_points(words, xs, ys, xs.size)
+    refuse_points(words, xs, ys)
     axis = _axis(turnovers(xs) if kind == "nearest" else xs)
     axis[_HEADER - 1] = axis.size
     rows = finite_rows(words, _ROWS[kind], xs, ys)
@@ -180,15 +180,14 @@ def surface(
     for name in given.keys() - set(named):
         raise ModelError(f'{words}: units has "{name}"; its numbers are {listed(named)}')
     if path is not None:
-        names = [str(x), str(y), str(z)]
-        said = {name: partial(_in_units, name) for name in names}
-        read = columns_of(path, {name: given.get(name) for name in names}, said)
-        xs, ys, zs = grid_of(words, *(read[name] for name in names))
+        said = {name: partial(_in_units, name) for name in named}
+        read = columns_of(path, {name: given.get(name) for name in named}, said)
+        xs, ys, zs = grid_of(words, *(read[name] for name in named))
     else:
         xs, ys = array_of(x, "x", given.get("x")), array_of(y, "y", given.get("y"))
         zs = array_of(z, "z", given.get("z"), dimensions=2)
-    refuse_points(words, xs, zs, xs.size)
-    refuse_points(words, ys, zs.T, ys.size)
+    refuse_points(words, xs, zs)
+    refuse_points(words, ys, zs.T)
     first, second = (_axis(turnovers(points) if kind == "nearest" else points) for points in (xs, ys))
     first[_HEADER - 1] = first.size
     second[_HEADER - 1] = first.size + second.size
