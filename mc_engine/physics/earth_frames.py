@@ -27,7 +27,7 @@ import numpy as np
 
 from mc_engine.lanes import atan2, cos, floor, physics, sin, sincos, sqrt
 from mc_engine.physics.constants import EARTH_RATE
-from mc_engine.physics.frames import WGS84_ECCENTRICITY2, WGS84_FLATTENING, WGS84_RADIUS, orbital_axes
+from mc_engine.physics.frames import TURN, WGS84_ECCENTRICITY2, WGS84_FLATTENING, WGS84_RADIUS, orbital_axes
 from mc_engine.physics.sun_moon import terrestrial_time
 from mc_engine.physics.vectors import (
     Matrix,
@@ -46,7 +46,6 @@ Flow = namedtuple("Flow", "speed alpha beta")
 Course = namedtuple("Course", "speed path_angle heading")
 Relative = namedtuple("Relative", "position velocity")
 
-_TWO_PI = 6.283185307179586
 _MJD = 2_400_000.5
 
 
@@ -61,7 +60,7 @@ def earth_rotation_angle(days):
     `mc_engine.physics.sun_moon`.  IERS Conventions (2010), eq. (5.15), with whole turns subtracted first.
     """
     turns = (days - floor(days)) + (0.7790572732640 + 0.00273781191135448 * days)
-    return _TWO_PI * (turns - floor(turns))
+    return TURN * (turns - floor(turns))
 
 
 @physics

@@ -5,9 +5,9 @@ reflected by the Earth are not modelled.  A spacecraft with large panels that do
 """
 
 from mc_engine.lanes import acos, asin, maximum, minimum, physics, sqrt, where
+from mc_engine.physics.constants import AU
 
 PRESSURE = 4.56e-6  # N/m^2 on a black surface at one astronomical unit: Montenbruck, Gill, section 3.4
-AU = 149_597_870_700.0
 RADIUS_SUN, RADIUS_EARTH = 6.96e8, 6_378_137.0
 PI = 3.141592653589793
 

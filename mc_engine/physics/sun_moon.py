@@ -12,10 +12,10 @@ import erfa
 import numpy as np
 
 from mc_engine.lanes import floor, look_up, physics, sqrt
+from mc_engine.physics.constants import AU
 
 # Gravitational parameters [m^3/s^2]: IERS Conventions (2010), table 1.1, and the Moon's by its mass ratio there.
 MU_SUN, MU_MOON = 1.32712440041e20, 4.902800e12
-AU = 149_597_870_700.0  # m, IAU 2012 resolution B2
 SPACING = 0.25  # days between the nodes of a table
 COLUMNS = 12  # of a node: place of the Sun [m] and its change over SPACING, then the same of the Moon
 _MJD = 2_400_000.5

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mc_engine.physics.radiation import AU, PRESSURE, RADIUS_EARTH, RADIUS_SUN, discs, solar_pressure, sunlit
+from mc_engine.physics.constants import AU
+from mc_engine.physics.radiation import PRESSURE, RADIUS_EARTH, RADIUS_SUN, discs, solar_pressure, sunlit
 
 SUN = (AU, 0.0, 0.0)
 GEO = 42_164_170.0
