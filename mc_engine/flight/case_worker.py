@@ -382,8 +382,8 @@ def _serve(descriptor: int, work: Path, parent: int) -> None:
     try:
         worker = Worker(setup, work)
     except BaseException as error:
-        text = str(error) if isinstance(error, EngineError) else fault_of(error, setup.reference)  # type: ignore[arg-type]
-        connection.send(f"`start` failed: {text}" if not isinstance(error, EngineError) else text)
+        text = str(error) if isinstance(error, EngineError) else f"`start` failed: {fault_of(error, setup.reference)}"
+        connection.send(text)
         return
     connection.send("")
     with suppress(EOFError, ConnectionError):

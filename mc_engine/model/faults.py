@@ -82,13 +82,13 @@ def naming_faults(reference: str, what: str, more: str = MORE) -> Iterator[None]
         raise ModelError(f"{text}{more}") from error
 
 
-def fault_of(error: Exception, reference: str) -> str:
+def fault_of(error: BaseException, reference: str) -> str:
     """The error of a model's own code in one line, with its place."""
     place, cause = _place_and_cause(error)
     return f"{place or reference}: {cause}{_hint_of_module(error)}"
 
 
-def _hint_of_module(error: Exception) -> str:
+def _hint_of_module(error: BaseException) -> str:
     """The remedy for a module next to the model that one of its functions imports when it runs."""
     frame, _ = frame_in_model(error)
     if not isinstance(error, ModuleNotFoundError) or frame is None or frame.f_code.co_name == "<module>":
@@ -252,7 +252,7 @@ def wrong_import(error: BaseException) -> str:
     return f'{who} has no "{missing[1]}"; use {instead}; {_OF_0_1}'
 
 
-def _place_and_cause(error: Exception) -> tuple[str, str]:
+def _place_and_cause(error: BaseException) -> tuple[str, str]:
     """(place, or nothing; the error in one line)."""
     if _of_the_compiler(error):
         return _compiler_fault(re.sub(r"\x1b\[[0-9;]*m", "", str(error)))  # without colours
@@ -267,7 +267,7 @@ def text_of(error: BaseException) -> str:
         return f"its text cannot be given, as its __str__ raises {type(fault).__name__}"
 
 
-def _of_the_compiler(error: Exception) -> bool:
+def _of_the_compiler(error: BaseException) -> bool:
     """Whether an error is the compiler's, or broke out of it on the way."""
     *_, (frame, _) = [(None, 0), *walk_tb(error.__traceback__)]
     if isinstance(error, OSError | MemoryError):
