@@ -174,11 +174,9 @@ class Memory:
 
         calls : of the events' own functions, by name.  In another phase an event is a constant.
         """
-        names = [*self.events]
-        watched: Any = None
         if self.phases:
             parts = [self._watched_in(phase.events, calls) for phase in self.phases.values()]
-            watched = Alternatives(("argument", _MEMORY, PHASE), parts)
+            watched: Any = Alternatives(("argument", _MEMORY, PHASE), parts)
         else:
             watched = self._watched_in(self.events, calls)
         if not self.delayed:
@@ -186,7 +184,7 @@ class Memory:
         since: list[Call] = [
             (_since_due, (("argument", _TIME, ""), ("argument", _MEMORY, due_field(name)))) for name in self.delayed
         ]
-        picks: list[Pick] = [("result", 0, name) for name in names]
+        picks: list[Pick] = [("result", 0, name) for name in self.events]
         picks += [("result", 1 + i, "") for i in range(len(since))]
         both = record_class("Events", [event.name for event in self.event_list()])
         return ComposedFunction([(watched, whole(range(5))), *since], both, picks)
