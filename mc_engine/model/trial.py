@@ -105,7 +105,7 @@ def _run_through(model: Model, p: Any, o: Any, seed: int, finite: bool) -> None:
         _try_phase(model, t, s, m._replace(**{PHASE: number + t}), p, o, seed, False)
     m = _try_phase(model, t, s, m, p, o, seed, finite)
     seen = _of_cases(_call(model, "observe", t, s, m, p, o))
-    best = _looks(model, seen)
+    best = _best(model, seen)
     _call(model, "evaluate", t, s, m, p, o, best, type(best)(*(np.zeros(FEW) for _ in best)))
 
 
@@ -150,11 +150,11 @@ def _of_phase(function: Any, arguments: tuple[Any, ...]) -> Any:
     return function.parts[int(np.ravel(value_of(function.number, arguments, ()))[0])]
 
 
-def _looks(model: Model, seen: Any) -> Any:
+def _best(model: Model, seen: Any) -> Any:
     """The argument `best` of `evaluate` for outputs that stay constant.  seen : result of `observe`."""
-    best = namedtuple("Best", [extremum.name for extremum in model.extrema] or ["unused"])  # type: ignore[misc]
+    record = namedtuple("Best", [extremum.name for extremum in model.extrema] or ["unused"])  # type: ignore[misc]
     names = [output.name for output in model.quantities]
-    return best(*[seen[names.index(extremum.quantity)] for extremum in model.extrema] or [np.zeros(FEW)])
+    return record(*[seen[names.index(extremum.quantity)] for extremum in model.extrema] or [np.zeros(FEW)])
 
 
 def fixed_metrics(model: Model, p: Any, o: Any) -> dict[str, float]:
@@ -180,8 +180,8 @@ def fixed_metrics(model: Model, p: Any, o: Any) -> dict[str, float]:
         try:
             with np.errstate(all="ignore"):
                 s, m = model.initial(p, o), NoMemory(0.0) if model.start is None else model.start(p, o)
-                looks = _looks(model, model.observe(np.zeros(FEW), s, m, p, o))
-                given = model.evaluate(many(1.0), many(s), many(m), many(p), own, many(looks), many(looks))
+                best = _best(model, model.observe(np.zeros(FEW), s, m, p, o))
+                given = model.evaluate(many(1.0), many(s), many(m), many(p), own, many(best), many(best))
                 values.append([np.broadcast_to(np.asarray(item, dtype=np.float64), _MANY) for item in given])
         except Exception:
             return {}  # no finding: the functions are judged by the trial itself
