@@ -66,8 +66,7 @@ def refuse_contradictions(model: "Model") -> None:
         _refuse_event(event, model.switch is not None)
     settings, states = ([item.symbol for item in items] for items in (model.settings, model.states))
     _refuse_clock(model.clock, settings, states)
-    clock, controlled = model.clock, model.control is not None
-    if controlled and isinstance(clock, AdaptiveStep) and clock.control_period == inf:
+    if model.control is not None and isinstance(model.clock, AdaptiveStep) and model.clock.control_period == inf:
         raise ModelError("the model has `control`, but its clock no `control_period`: the only sample is at t = 0; "
                          "write AdaptiveStep(..., control_period=0.1), the time [s] between samples")  # fmt: skip
 
@@ -98,7 +97,7 @@ def _refuse_false_numbers(system: "System") -> None:
     numbers: tuple[Any, ...] = (*inputs, *system.states, *system.quantities, *system.metrics)
     for item in numbers:
         refuse_other_types(item, f'{type(item).__name__} "{item.name}"')
-    _refuse_half_letters(system)
+    _refuse_half_letters(system, numbers)
     for item in numbers:
         refuse_name(item)
         _refuse_swapped(item)
@@ -121,10 +120,9 @@ def _refuse_false_numbers(system: "System") -> None:
     refuse_false_figures(system)
 
 
-def _refuse_half_letters(model: "System") -> None:
+def _refuse_half_letters(system: "System", numbers: Iterable[Any]) -> None:
     """ModelError for text that cannot be written to a file: a lone UTF-16 surrogate."""
-    records = (*model.parameters, *model.settings, *model.states, *model.quantities, *model.metrics)
-    texts = [model.name, model.title, model.source, model.figures, model.published, *map(vars, records)]
+    texts = [system.name, system.title, system.source, system.figures, system.published, *map(vars, numbers)]
     try:
         json.dumps(texts, ensure_ascii=False, default=str).encode()
     except UnicodeEncodeError as error:
