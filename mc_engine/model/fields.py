@@ -284,10 +284,7 @@ _WORDS: dict[Any, str] = {str: "a text", bool: "True or False", NoneType: "None"
 _WORDS |= dict.fromkeys((float, int), "a number")
 
 
-@cache
-def _declared_types(kind: type) -> dict[str, Any]:
-    """The declared type of each field of a dataclass, by name."""
-    return get_type_hints(kind)
+_declared_types = cache(get_type_hints)  # of each field of a dataclass, by name
 
 
 def refuse_other_types(record: Any, what: str) -> None:
