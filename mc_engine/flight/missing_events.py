@@ -24,11 +24,11 @@ from mc_engine.status import OK, STATUS_NAME
 from mc_engine.suggestions import listed
 
 _INTERPRETED_S = 10.0  # of the nominal case flown by Python: the kernel that it spares takes about as long to compile
-_LOOKED_AT = 5  # flights whose event functions are looked at: the nominal case and some others
+_FEW = 5  # flights whose event functions are examined: the nominal case and some others
 _ZERO = 1e-6  # of an event function's reach: a flight that comes or ends as near has reached the zero
 _DECIDED = "let its function depend on the state and parameters alone, or let `control` decide"
 _OTHER = {"rising": "falling", "falling": "rising"}
-Looks = dict[str, Columns]  # by the case in words, its times and event functions
+Histories = dict[str, Columns]  # by the case in words: times, and the functions of the events
 
 
 def events_that_never_happen(
@@ -55,9 +55,9 @@ def events_that_never_happen(
     flown = fly(watched, cases, noise, campaign.seed, folder=campaign.directory)
     ok = flown["status"] == STATUS_NAME[OK]
     missing = [event for event in asked if not _happens(event, {name: row[ok] for name, row in flown.items()})]
-    looks = _looks(campaign, watched, cases, noise) if missing else {}
+    histories = _histories(campaign, watched, cases, noise) if missing else {}
     for event in missing:
-        if sentence := _never_happens(model, event, looks, int(ok[1:].sum())):
+        if sentence := _never_happens(model, event, histories, int(ok[1:].sum())):
             yield sentence
 
 
@@ -69,11 +69,11 @@ def why_no_stop(campaign: Campaign) -> str:
     names = [delayed.get(name, name) for name in stops]
     usual = [event for event in model.event_list if event.name in names and not event.rare]
     cases = {name: np.array([value]) for name, value in campaign.nominal.items()}
-    looks = _looks(campaign, watching_events(model), cases, np.array([NOMINAL_NOISE]))
+    histories = _histories(campaign, watching_events(model), cases, np.array([NOMINAL_NOISE]))
     for event in usual:
-        if carried := _carried(model, event, looks):
+        if carried := _carried(model, event, histories):
             return f"no stopping event happens before the time limit: {carried}; {_DECIDED}"
-        if other := _other_way(event, looks):
+        if other := _other_way(event, histories):
             return f"no stopping event happens before the time limit: {other}; {_mended(event)}"
     if not delayed.keys() & {*stops}:
         happens, look_at = "crosses zero", "its direction"
@@ -126,27 +126,27 @@ def _happens(event: Event, times: Columns) -> bool:
     return bool(times) and not np.isnan(times[noted_field(event.name)]).all()
 
 
-def _looks(campaign: Campaign, watched: Model, cases: Mapping[str, np.ndarray], noise: np.ndarray) -> Looks:
+def _histories(campaign: Campaign, watched: Model, cases: Mapping[str, np.ndarray], noise: np.ndarray) -> Histories:
     """The event functions along the flights of the first cases, of which the first is the nominal one."""
-    few = {name: row[:_LOOKED_AT] for name, row in cases.items()}
-    noise = noise[:_LOOKED_AT]
+    few = {name: row[:_FEW] for name, row in cases.items()}
+    noise = noise[:_FEW]
     flights = fly_histories(watched, few, noise, campaign.seed, folder=campaign.directory)
     who = ["the nominal case", *(f"case {case}" for case in noise[1:])]
     flown = zip(who, flights, strict=True)
     return {name: history for name, (_, history) in flown if history["t_s"].size}
 
 
-def _never_happens(model: Model, event: Event, looks: Looks, n_cases: int) -> str:
+def _never_happens(model: Model, event: Event, histories: Histories, n_cases: int) -> str:
     """The sentence on an event; "" where a flight without phases comes to its zero, such as one that ends there."""
-    if carried := _carried(model, event, looks):
+    if carried := _carried(model, event, histories):
         return f"{carried}; {_DECIDED}, or declare it with rare=True if it is for unusual cases"
-    if other := _other_way(event, looks):
+    if other := _other_way(event, histories):
         return (f"{other}, in which it happens in none of {n_cases} cases; {_mended(event)}, or declare it with "
                 "rare=True if it is for unusual cases")  # fmt: skip
-    sizes = [np.abs(look[event.name]) for look in looks.values()]
+    sizes = [np.abs(history[event.name]) for history in histories.values()]
     if not model.phases and any(size.min() <= _ZERO * size.max() for size in sizes):
         return ""
-    values = np.concatenate([*(look[event.name] for look in looks.values()), np.empty(0)])
+    values = np.concatenate([*(history[event.name] for history in histories.values()), np.empty(0)])
     if model.phases or ((values < 0.0).any() and (values > 0.0).any()):
         within = ", in the phases that look for it" if model.phases else ""
         return (f'the event "{event.name}" happens in none of {n_cases} cases{within}; mend its function or its '
@@ -156,10 +156,10 @@ def _never_happens(model: Model, event: Event, looks: Looks, n_cases: int) -> st
             "the function, or declare it with rare=True if it is for unusual cases")  # fmt: skip
 
 
-def _other_way(event: Event, looks: Looks) -> str:
+def _other_way(event: Event, histories: Histories) -> str:
     """Where an event's function crosses zero against the event's direction, and in that never; "" if nowhere."""
-    for who, look in looks.items():
-        own, t = (_time_of_crossing(look["t_s"], look[event.name], way)
+    for who, history in histories.items():
+        own, t = (_time_of_crossing(history["t_s"], history[event.name], way)
                   for way in (event.direction, _OTHER.get(event.direction, "")))  # fmt: skip
         if np.isnan(own) and not np.isnan(t):
             return (f'{_place(event)}: the event "{event.name}" crosses zero {_OTHER[event.direction]} at '
@@ -167,13 +167,13 @@ def _other_way(event: Event, looks: Looks) -> str:
     return ""
 
 
-def _carried(model: Model, event: Event, looks: Looks) -> str:
+def _carried(model: Model, event: Event, histories: Histories) -> str:
     """Where a sample, a switch or the beginning of a phase carries an event's function over zero; "" if nowhere."""
     signs: tuple[float, ...] = (DIRECTIONS[event.direction],)
     if event.direction == "either":  # with phases it is 1 where it is not looked for: a jump that is none of its own
         signs = () if model.phases else (1.0, -1.0)
-    for (who, look), sign in product(looks.items(), signs):
-        t, values = look["t_s"], sign * look[event.name]
+    for (who, history), sign in product(histories.items(), signs):
+        t, values = history["t_s"], sign * history[event.name]
         jumps = np.flatnonzero((t[1:] == t[:-1]) & (values[:-1] < 0.0) & (values[1:] >= 0.0))
         if jumps.size:
             return (
