@@ -8,16 +8,14 @@ and for other planets see `mc_engine.physics.atmosphere`, for wind `wind_profile
 
 import math
 from collections import namedtuple
-from itertools import pairwise
 
 from mc_engine.lanes import exp, maximum, minimum, physics, sqrt, where
-from mc_engine.physics.atmosphere import US76_TOP, VACUUM, us76_logarithm
+from mc_engine.physics.atmosphere import GAS_CONSTANT, US76_TOP, VACUUM, aloft_constants, us76_logarithm
 
 Air = namedtuple("Air", "density pressure temperature speed_of_sound")
 
-# U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562): gas constant of air R*/M0 [J/(kg K)] and ratio of specific heats,
-# table 2; geometric altitude [m] and pressure [Pa] above 86 km, table I.
-GAS_CONSTANT = 8314.32 / 28.9644
+# U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562): ratio of specific heats, table 2; geometric altitude [m] and
+# pressure [Pa] above 86 km, table I.
 HEAT_RATIO = 1.4
 _ALOFT = (
     (90e3, 1.8359e-1),
@@ -33,15 +31,12 @@ _ALOFT = (
 )
 
 
-def _aloft_constants():
-    """Of each interval (base [m], a, c): ln p = a + c h."""
+def _top_pressure_logarithm():
     logarithm, _, temperature = us76_logarithm(US76_TOP * (1.0 - 1e-15))
-    nodes = [(US76_TOP, logarithm + math.log(GAS_CONSTANT * temperature)), *((h, math.log(p)) for h, p in _ALOFT)]
-    slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(nodes)]
-    return tuple(zip(*((h, y - c * h, c) for (h, y), c in zip(nodes, slopes, strict=False)), strict=True))
+    return logarithm + math.log(GAS_CONSTANT * temperature)
 
 
-_BASE, _A, _C = _aloft_constants()
+_BASE, _A, _C = zip(*aloft_constants(_top_pressure_logarithm(), _ALOFT), strict=True)
 
 
 @physics

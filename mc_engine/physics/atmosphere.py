@@ -65,11 +65,12 @@ def layered(h):
 # and far too thin aloft: a mathematical test, no model of the planet.
 EXPONENTIALS = {"earth": (1.225, 7200.0), "mars": (0.020, 11_100.0), "venus": (65.0, 15_900.0)}
 
-# U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562), tables 2 to 4: radius for the geopotential altitude [m],
-# g0 M0 / R* [K/m], and of each layer the base [geopotential m], the lapse rate [K/m] and the base temperature [K].
+# U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562), tables 2 to 4: radius for the geopotential altitude [m], gas
+# constant of air R*/M0 [J/(kg K)], g0 M0 / R* [K/m], and of each layer the base [geopotential m] and the lapse rate
+# [K/m].
 GEOPOTENTIAL_RADIUS = 6_356_766.0
-_GAS_CONSTANT = 8314.32 / 28.9644  # of air [J/(kg K)]
-_G_OVER_R = 9.80665 / _GAS_CONSTANT
+GAS_CONSTANT = 8314.32 / 28.9644
+_G_OVER_R = 9.80665 / GAS_CONSTANT
 _US76_LAYERS = (
     (0.0, -6.5e-3),
     (11e3, 0.0),
@@ -97,36 +98,34 @@ _US76_ALOFT = (
 
 
 def _layer_constants():
-    """Of each layer (base, T at zero, lapse rate, a, b, c): T = T at zero + lapse x, ln rho = a + b ln T + c x.
+    """(constants of each layer, ln rho at the top of the last).
 
-    x [m] is the geopotential altitude.  b is zero where the layer is isothermal, else c is.
+    The constants are (base, T at zero, lapse rate, a, b, c): T = T at zero + lapse x, ln rho = a + b ln T + c x.  x [m]
+    is the geopotential altitude.  b is zero where the layer is isothermal, else c is.
     """
     rows = []
-    temperature, log_density = 288.15, math.log(101_325.0 / (_GAS_CONSTANT * 288.15))
-    for i, (base, lapse) in enumerate(_US76_LAYERS):
+    temperature, log_density = 288.15, math.log(101_325.0 / (GAS_CONSTANT * 288.15))
+    highest = GEOPOTENTIAL_RADIUS * US76_TOP / (GEOPOTENTIAL_RADIUS + US76_TOP)
+    tops = *(base for base, _ in _US76_LAYERS[1:]), highest
+    for (base, lapse), top in zip(_US76_LAYERS, tops, strict=True):
         b = -(1.0 + _G_OVER_R / lapse) if lapse else 0.0
         c = 0.0 if lapse else -_G_OVER_R / temperature
         a = log_density - b * math.log(temperature) - c * base
         rows.append((base, temperature - lapse * base, lapse, a, b, c))
-        top = _US76_LAYERS[i + 1][0] if i + 1 < len(_US76_LAYERS) else _geopotential_of_number(US76_TOP)
         temperature += lapse * (top - base)
         log_density = a + b * math.log(temperature) + c * top
-    return tuple(rows), temperature, log_density
+    return tuple(rows), log_density
 
 
-def _geopotential_of_number(h):
-    return GEOPOTENTIAL_RADIUS * h / (GEOPOTENTIAL_RADIUS + h)
-
-
-def _aloft_constants(log_density):
-    """Of each interval (base [m], a, c): ln rho = a + c h."""
-    nodes = [(US76_TOP, log_density), *((h, math.log(rho)) for h, rho in _US76_ALOFT)]
+def aloft_constants(logarithm_at_top, table):
+    """Of each interval above 86 km (base [m], a, c): the logarithm of a tabulated quantity is a + c h."""
+    nodes = [(US76_TOP, logarithm_at_top), *((h, math.log(value)) for h, value in table)]
     slopes = [(y1 - y0) / (h1 - h0) for (h0, y0), (h1, y1) in pairwise(nodes)]
     return tuple((h, y - c * h, c) for (h, y), c in zip(nodes, slopes, strict=False))
 
 
-_LAYERS, _TOP_TEMPERATURE, _TOP_LOG_DENSITY = _layer_constants()
-_ALOFT = _aloft_constants(_TOP_LOG_DENSITY)
+_LAYERS, _TOP_LOG_DENSITY = _layer_constants()
+_ALOFT = aloft_constants(_TOP_LOG_DENSITY, _US76_ALOFT)
 _BASE, _T0, _LAPSE, _A, _B, _C = tuple(zip(*_LAYERS, strict=True))
 _ALOFT_BASE, _ALOFT_A, _ALOFT_C = tuple(zip(*_ALOFT, strict=True))
 
