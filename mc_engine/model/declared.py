@@ -110,12 +110,7 @@ def model(
     >>> [metric.name for metric in load_campaign("minimal").model.metrics]
     ['apogee_altitude_km', 'apogee_time_s', 'top_speed_m_s']
     """
-    for what, record in (("inputs", inputs), ("states", states), ("outputs", outputs), ("metrics", metrics)):
-        if not hasattr(record, "declared"):
-            raise ModelError(f"`{what}` is {record!r}; declare it, {_DECLARATIONS[what]} = {what}(...)")
-        if record.__name__ != _DECLARATIONS[what]:
-            maker = next(name for name, title in _DECLARATIONS.items() if title == record.__name__)
-            raise ModelError(f"`{what}` is what {maker}(...) made; hand over what {what}(...) made")
+    _refuse_undeclared(inputs=inputs, states=states, outputs=outputs, metrics=metrics)
     kernel_parameters = kernel_parameters or inputs
     phases = _phases(phases, rhs=rhs, control=control, events=events)
     declared = events_of(phases, checked_events(events))
@@ -196,6 +191,16 @@ def prepared(prepare: Callable[..., Any], inputs: Any) -> Any:
         raise ModelError(f"`prepare` gives {type(given).__name__}; it must return a dictionary of arrays, by the names "
                          "that physics reads from p")  # fmt: skip
     return record_class("Parameters", [name for name in given if name != TABLES])
+
+
+def _refuse_undeclared(**records: Any) -> None:
+    """ModelError for a record that the function of its name did not make."""
+    for what, record in records.items():
+        if not hasattr(record, "declared"):
+            raise ModelError(f"`{what}` is {record!r}; declare it, {_DECLARATIONS[what]} = {what}(...)")
+        if record.__name__ != _DECLARATIONS[what]:
+            maker = next(name for name, title in _DECLARATIONS.items() if title == record.__name__)
+            raise ModelError(f"`{what}` is what {maker}(...) made; hand over what {what}(...) made")
 
 
 def _phases(phases: Any, **others: Any) -> Mapping[str, Phase]:
