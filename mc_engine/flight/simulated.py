@@ -184,15 +184,16 @@ class SimulatorFlyer(Flyer):
         asked = self._campaign.retention
         if not self.simulator.outputs and (asked.first or asked.cases or asked.worst_of):
             lines.append("no time histories are saved, because the simulator declares no outputs")
+        return faults, [*lines, self._duration(seconds)]
+
+    def _duration(self, seconds: float) -> str:
+        """How long a case takes, and the campaign on this machine."""
         cores = os.cpu_count() or 1
         workers = min(cores, self.most_workers or cores)
         whole = seconds * -(-self._campaign.cases // workers)  # a worker flies a case alone
         takes = about(whole / 3600.0, "hours") if whole > _FEW_MINUTES else about(whole, "s")
-        lines.append(
-            f"{seconds:.3g} s a case, {takes} for {counted(self._campaign.cases, 'case')} on "
-            f"{counted(workers, 'worker')}"
-        )
-        return faults, lines
+        cases = counted(self._campaign.cases, "case")
+        return f"{seconds:.3g} s a case, {takes} for {cases} on {counted(workers, 'worker')}"
 
     def _not_as_declared(self, metrics: list[str]) -> list[str]:
         """One sentence if metrics differ between two flights of a case, and may not."""
