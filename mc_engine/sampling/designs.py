@@ -63,9 +63,9 @@ def block_problem(design: str, n_dispersions: int, n_cases: int) -> str:
     """Why a design cannot have this number of cases, as a sentence; empty if it can."""
     if n_cases > MOST_CASES:
         return f"{n_cases} is not allowed; it must be at most {MOST_CASES}"
-    if design not in IN_BLOCKS or not n_dispersions or n_cases % block_size(design, n_dispersions) == 0:
-        return ""
     size = block_size(design, n_dispersions)
+    if design not in IN_BLOCKS or not n_dispersions or n_cases % size == 0:
+        return ""
     below = n_cases // size * size
     nearest = f"{below} or {below + size} would fit" if below else f"{size} would fit"
     return (

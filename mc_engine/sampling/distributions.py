@@ -183,10 +183,10 @@ class Truncated(Distribution):
     @property
     def span(self) -> tuple[float, float]:
         low, high = self.base.span
-        if max(low, self.lower) >= min(high, self.upper):  # wholly in one tail, and perhaps without an end
-            ends = quantiles(self, np.array([_TAIL, 1.0 - _TAIL]))
-            return float(ends[0]), float(ends[1])
-        return max(low, self.lower), min(high, self.upper)
+        low, high = max(low, self.lower), min(high, self.upper)
+        if low >= high:  # wholly in one tail, and perhaps without an end
+            low, high = quantiles(self, np.array([_TAIL, 1.0 - _TAIL])).tolist()
+        return low, high
 
     def ppf(self, u: np.ndarray) -> np.ndarray:
         below, above = self.base.cdf(self.lower), self.base.sf(self.lower)
@@ -320,10 +320,9 @@ def share_outside(distribution: Continuous | Truncated, low: float, high: float)
     if isinstance(distribution, Continuous):
         return distribution.cdf(low) + distribution.sf(high)
     base, lower, upper = distribution.base, distribution.lower, distribution.upper
-    outside = base.share_between(lower, min(max(lower, low), upper)) + base.share_between(
-        max(min(upper, high), lower), upper
-    )
-    return outside / base.share_between(lower, upper)
+    below = base.share_between(lower, min(max(lower, low), upper))
+    above = base.share_between(max(min(upper, high), lower), upper)
+    return (below + above) / base.share_between(lower, upper)
 
 
 def quantiles(distribution: Distribution, u: np.ndarray) -> np.ndarray:
