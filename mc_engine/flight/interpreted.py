@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
+from mc_engine.flight.kernel_parts import PHYSICS, functions_of, second_order_of, settings_class, tracking_of
 from mc_engine.lanes.composed import Alternatives, ComposedFunction, has_powers
 from mc_engine.lanes.fixed_step import Method
 from mc_engine.lanes.functions import TABLES, fma
@@ -41,8 +42,6 @@ class InterpretedFlight:
     composed, alternatives = ComposedFunction, Alternatives
 
     def __init__(self, model: Model, seconds: float = math.inf):
-        from mc_engine.flight.kernel_parts import PHYSICS, functions_of, second_order_of, settings_class
-
         self.origin: Origin | None = None
         self.metrics: tuple[Any, ...] = ()
         self._end = time.monotonic() + seconds
@@ -59,8 +58,6 @@ class InterpretedFlight:
         self, parameters: np.ndarray, settings: np.ndarray, data: Any, key: Any, cases: np.ndarray, *rest: Any
     ) -> None:
         """Fly the first case; arguments and results are those of the model's kernel."""
-        from mc_engine.flight.kernel_parts import tracking_of
-
         model, adaptive = self.model, isinstance(self.model.clock, AdaptiveStep)
         fly = self._interpreted("adaptive_flight" if adaptive else "fixed_step")["fly"]
         actions = [event.action for event in model.event_list]
