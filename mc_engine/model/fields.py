@@ -12,7 +12,6 @@ from mc_engine.dates import modified_julian_date
 from mc_engine.errors import ModelError
 from mc_engine.units import UNITS, unit_suffix
 
-Number = float | np.ndarray
 OF_NAME = "that of the name"  # in place of a unit, until the declaration has given the name
 EXTREMA = ("max", "min", "last_above")  # flown by flight.kernel_parts; worded by declarations.Metric.meaning
 DIRECTIONS = {"rising": 1.0, "falling": -1.0, "either": 0.0}  # of events, and their signs
