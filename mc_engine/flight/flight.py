@@ -129,7 +129,7 @@ def _settings_of(model: Model, codes: tuple[float, ...]) -> Any:
 
 
 def _kernel_settings(model: Model, codes: np.ndarray, chosen: Any) -> np.ndarray:
-    """The same as one array, as kernels take it: codes, then NaN, the last place of the tables, and the tables."""
+    """The same as one array, as kernels take it: codes, then NaN, the last index of the tables, and the tables."""
     if model.tables is None:
         return codes
     return np.concatenate([codes, [np.nan, chosen.tables.size - 1.0], chosen.tables])

@@ -69,7 +69,7 @@ def kept_design(design: Callable[..., np.ndarray], *inputs: Any) -> np.ndarray:
 
 
 def _digest(path: Path, content: bytes) -> bytes:
-    """Of a file of the cache, which is no sound one in the place of another."""
+    """SHA-256 of a cached file's name and content: content under another file's name is not valid."""
     return sha256(path.name.encode() + content).digest()
 
 

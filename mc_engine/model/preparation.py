@@ -28,7 +28,7 @@ class Prepared:
     """Cases ready for the kernel: SI parameter rows, setting codes, and which cases were refused and why."""
 
     parameters: np.ndarray  # float64[n_kernel_parameters, n]
-    settings: np.ndarray  # float64[n, n_settings]
+    settings: np.ndarray  # float64[n, n_settings]; of a model without settings one column of zeros
     refusals: Refusals
     tables: np.ndarray  # float64[...], what `prepare` adds to the model's tables, one case's numbers after another's
 

@@ -1,4 +1,4 @@
-"""Syntax trees of Python sources, and the names that a source imports."""
+"""Syntax trees of Python sources: what a source imports, the data files that it names, what it defines twice."""
 
 import ast
 import linecache
