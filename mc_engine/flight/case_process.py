@@ -159,10 +159,8 @@ class CaseProcess:
                 self._process.send_signal(signal.SIGHUP)
                 self._process.wait(END_S)
         for stop in (lambda: os.killpg(self._process.pid, signal.SIGKILL), self._process.kill):
-            try:
+            with suppress(ProcessLookupError, PermissionError):
                 stop()
-            except (ProcessLookupError, PermissionError):
-                continue
         self._process.wait()
         _alive.discard(self)
         end_noted(self.work)

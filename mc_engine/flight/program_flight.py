@@ -390,7 +390,5 @@ def _input_difference(document: Any, path: str, inputs: Mapping[str, Any]) -> st
 
 def end_noted(work: Path) -> None:
     """Kill the program whose start was noted in `work`, where its own process could not."""
-    try:
+    with suppress(OSError, ValueError):
         kill_group(int((work / PROGRAM_ID).read_text()))
-    except (OSError, ValueError):
-        pass
