@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from mc_engine.flight.contract import breaches, flight_faults, refuse_breaches
 from mc_engine.flight.flyer import Columns, Copies, Flyer, Inputs, Process, never, refused_among_first
 from mc_engine.flight.kernel import FINER_STEPS, finer, make_kernel_folder, source_digest, usual_width
 from mc_engine.flight.lost_numbers import first_lost, may_be_lost
-from mc_engine.model.fields import AdaptiveStep
+from mc_engine.model.fields import AdaptiveStep, FixedStep
 from mc_engine.model.preparation import prepare
 from mc_engine.model.record import compiled_model
 from mc_engine.store.case_rows import RowLog
@@ -41,9 +40,7 @@ class CompiledFlyer(Flyer):
         keep: Path | None = None,
         stopped: Callable[[], bool] = never,
     ) -> Columns:
-        return flight.fly(
-            self._model, inputs, noise, self._seed, folder=self._folder, width=self._width, build=self._build
-        )
+        return self._fly(inputs, noise)
 
     def histories(
         self, inputs: Inputs, noise: np.ndarray, rows: int, stopped: Callable[[], bool] = never
@@ -57,8 +54,11 @@ class CompiledFlyer(Flyer):
         """Fly one step of the nominal case, however long that is."""
         clock, nominal = self._model.clock, self._campaign.nominal
         one_step = replace(clock, attempts=1) if isinstance(clock, AdaptiveStep) else replace(clock, until=clock.step)
-        fly = partial(flight.fly, folder=self._folder, width=self._width, clock=one_step, build=self._build)
-        fly(self._model, nominal, np.zeros(1, dtype=np.int64), self._seed)
+        self._fly(nominal, np.zeros(1, dtype=np.int64), one_step)
+
+    def _fly(self, inputs: Inputs, noise: np.ndarray, clock: FixedStep | AdaptiveStep | None = None) -> Columns:
+        model, folder, width, build = self._model, self._folder, self._width, self._build
+        return flight.fly(model, inputs, noise, self._seed, folder=folder, width=width, clock=clock, build=build)
 
     def faults(self) -> list[str]:
         return breaches(self._campaign)
