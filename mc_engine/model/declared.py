@@ -318,8 +318,7 @@ def _extrema(metrics: Any, outputs: Any, named: Mapping[str, Metric]) -> tuple[t
     """(the extremes that the flight tracks, each once; the name in `best` of each computed metric's)."""
     known = {item.name: item for item in outputs.declared} | {"t_s": _TIME}
     tracked: dict[Extremum, str] = {}
-    symbols = {item.name: item.symbol for item in metrics.declared}
-    units = {item.name: item.unit for item in metrics.declared}
+    fields = {item.name: item for item in metrics.declared}
     places = {}
     for key, metric in named.items():
         if not isinstance(metric, Metric) or metric.extremum is None:
@@ -336,12 +335,12 @@ def _extrema(metrics: Any, outputs: Any, named: Mapping[str, Metric]) -> tuple[t
         if output == _TIME.name and metric.source not in ("end", "event"):
             raise ModelError(f'metric "{name}": the time "t_s" has no extremum; use at_end')
         unit = "s" if metric.source == "time" else known[output].unit
-        if UNITS[units[name]].quantity != UNITS[unit].quantity:
+        if UNITS[fields[name].unit].quantity != UNITS[unit].quantity:
             meant = [f', or say unit="{ending}"' for ending in units_at_the_end(name) if ending in compatible(unit)]
-            raise ModelError(f'metric "{name}" is in "{units[name]}", but it holds a value in "{unit}"; change its '
-                             f"name or the output{''.join(meant)}")  # fmt: skip
+            raise ModelError(f'metric "{name}" is in "{fields[name].unit}", but it holds a value in "{unit}"; change '
+                             f"its name or the output{''.join(meant)}")  # fmt: skip
         if metric.extremum is not None:
-            places[name] = tracked.setdefault(metric.extremum, symbols[name])
+            places[name] = tracked.setdefault(metric.extremum, fields[name].symbol)
     return tuple(replace(extremum, name=name) for extremum, name in tracked.items()), places
 
 
