@@ -39,7 +39,7 @@ _alive: set["CaseProcess"] = set()  # waiting or flying
 _ending = threading.Event()  # once this process is about to end
 _lock = threading.Lock()
 # A process ends with the thread that started it, so one thread that lives as long as this process starts all.
-_starter: list[ThreadPoolExecutor] = []
+_starter = ThreadPoolExecutor(1, thread_name_prefix="mc-engine-starter")  # which begins its thread at the first task
 
 
 class CaseEnded(Exception):
@@ -61,10 +61,7 @@ class CaseProcess:
         self.work = Path(tempfile.mkdtemp(prefix=WORK))
         ours, theirs = socket.socketpair()
         try:
-            with _lock:
-                if not _starter:
-                    _starter.append(ThreadPoolExecutor(1, thread_name_prefix="mc-engine-starter"))
-            self._process = _starter[0].submit(self._start, theirs.fileno()).result()
+            self._process = _starter.submit(self._start, theirs.fileno()).result()
             _alive.add(self)
         finally:
             theirs.close()
