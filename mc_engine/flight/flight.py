@@ -9,14 +9,14 @@ import numpy as np
 
 from mc_engine.campaign.columns import END_PHASE, END_TIME
 from mc_engine.errors import ModelError
-from mc_engine.flight.flyer import Columns, phase_words, status_words
+from mc_engine.flight.flyer import Columns, Inputs, phase_words, status_words
 from mc_engine.flight.kernel import Builder, adaptive_arguments, build_kernel, fixed_arguments, grid_of, usual_width
 from mc_engine.flight.kernel_parts import blocks_of, settings_class
 from mc_engine.lanes.kernel_data import gathered
 from mc_engine.lanes.philox import noise_key
 from mc_engine.model.designs import designing
 from mc_engine.model.fields import AdaptiveStep, Field, FixedStep, inputs_of
-from mc_engine.model.preparation import Inputs, Prepared, prepare
+from mc_engine.model.preparation import Prepared, prepare
 from mc_engine.model.record import Model, Refusals
 from mc_engine.model.trial import refuse_unfit
 from mc_engine.status import OK, REFUSED

@@ -19,7 +19,6 @@ from mc_engine.model.reading import place_of
 from mc_engine.model.record import Model, Refusals
 from mc_engine.suggestions import hint
 
-Inputs = Mapping[str, Any]
 MISUSES = (TypeError, KeyError, AttributeError, ValueError)
 
 
@@ -33,7 +32,7 @@ class Prepared:
     tables: np.ndarray  # float64[...], what `prepare` adds to the model's tables, one case's numbers after another's
 
 
-def prepare(model: Model, inputs: Inputs, n_cases: int) -> Prepared:
+def prepare(model: Model, inputs: Mapping[str, Any], n_cases: int) -> Prepared:
     """SI parameters for the kernel.
 
     inputs : every parameter and setting of the model by column name, in declared units; a value counts for
