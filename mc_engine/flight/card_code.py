@@ -21,7 +21,7 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 
-from mc_engine.errors import EngineError
+from mc_engine.errors import EngineError, ModelError
 from mc_engine.lanes.kernel_cache import Form, Kernel, form_of, kept_or_made
 
 TRIPLE = "nvptx64-nvidia-cuda"
@@ -199,18 +199,18 @@ def _optimised(text: str) -> str:
     optimised = str(module)
     # the back end writes x - trunc(x / y) * y, which differs from the remainder: 0.5 % 0.1 would be -3e-17, not 0.1
     if "= frem " in optimised:
-        raise EngineError("physics takes a remainder of plain numbers, by %, // or divmod, which a card computes "
-                          "otherwise; take floor of mc_engine.lanes, or fly on the processor")  # fmt: skip
+        raise ModelError("physics takes a remainder of plain numbers, by %, // or divmod, which a card computes "
+                         "otherwise; take floor of mc_engine.lanes, or fly on the processor")  # fmt: skip
     return choices_of_bits(optimised)
 
 
 def _refuse_unknown(names: Sequence[str]) -> None:
-    """EngineError for functions that a card has not: the back end would end the process."""
+    """ModelError for functions that a card has not: the back end would end the process."""
     for name in names:
         own = name.removeprefix("llvm.").split(".")[0]
         if own == name or own in _OF_THE_PROCESSOR_ONLY:
-            raise EngineError(f'physics calls {own} on plain numbers, which a card has not; take that of '
-                              "mc_engine.lanes, or fly on the processor")  # fmt: skip
+            raise ModelError(f'physics calls {own} on plain numbers, which a card has not; take that of '
+                             "mc_engine.lanes, or fly on the processor")  # fmt: skip
 
 
 def choices_of_bits(ir: str) -> str:

@@ -21,10 +21,8 @@ from mc_engine.campaign.loading import load_campaign
 from mc_engine.command_line.commands import app
 from mc_engine.errors import CampaignError, EngineError, ModelError
 from mc_engine.flight.card_code import PER_CASE
-from mc_engine.flight.flight import fly
 from mc_engine.lanes.compiler import compile_kernel
 from mc_engine.lanes.kernel_cache import Kernel
-from mc_engine.model import load_model
 from mc_engine.runner import backends, cards, runner
 from mc_engine.runner.backends import Backend
 from tests.benchmarks import card_speed
@@ -220,6 +218,19 @@ MODEL = model(
 )
 """
 
+FALLS = """
+[campaign]
+model = "model.py"
+design = "mc"
+cases = 3
+seed = 1
+
+[dispersion.gravity_m_s2]
+dist = "normal"
+sigma = 0.1
+source = "a test"
+"""
+
 
 def erring(parameters, settings, data, key, cases, time, status, state, metrics, history, rows, stride):
     """A kernel that cannot fly case 7: no physics that is compiled raises, so it is written by hand."""
@@ -253,9 +264,10 @@ def test_a_flight_that_ends_with_an_error_is_told_as_on_the_processor(tmp_path, 
 def test_what_a_card_cannot_compute_is_named(term, sentence, tmp_path, monkeypatch):
     install(monkeypatch, FakeDriver())
     (tmp_path / "model.py").write_text(FALL.replace("2.5 ** o.k", term))
-    model, inputs = load_model("model.py", tmp_path), {"gravity_m_s2": np.array([9.5, 9.0, 9.25]), "k": 1.37}
-    with pytest.raises(EngineError, match=sentence):
-        fly(model, inputs, np.arange(3), 1, folder=tmp_path, width=1, build=cards._card_kernel)
+    (tmp_path / "campaign.toml").write_text(FALLS)
+    with pytest.raises(ModelError, match=sentence):
+        runner.run(load_campaign(tmp_path), tmp_path / "run", backend="cuda")
+    assert not (tmp_path / "run").exists()  # the same command flies the corrected model
 
 
 def test_a_card_has_no_limits_for_a_case():
