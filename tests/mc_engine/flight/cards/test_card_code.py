@@ -5,6 +5,7 @@ compiled for the processor gives the bits of the engine's own kernel.
 """
 
 import re
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,9 +14,14 @@ from assembler import assembled, ptxas
 from processor_twin import ProcessorTwin
 from shipped_kernels import MODELS, NAMES, kernel_call
 
+from mc_engine.campaign.loading import load_campaign
 from mc_engine.errors import EngineError
+from mc_engine.flight import flight
 from mc_engine.flight.card_code import CAPABILITIES, PER_CASE, TRIPLE, choices_of_bits, ptx_of, thread_code
 from mc_engine.lanes.kernel_cache import form_of
+from mc_engine.model import AdaptiveStep
+from mc_engine.studies.lane_speed import campaign_flight
+from tests.benchmarks.card_speed import DAY
 
 CASES = 8
 LARGE = ("reentry", "geo_servicing")  # whose code takes longest to compile; they are slow tests as variants are
@@ -33,10 +39,8 @@ def code_of(name):
     return call, thread_code(call.func, call.args)
 
 
-@pytest.mark.parametrize("name", CAMPAIGNS)
-def test_on_the_processor_the_code_gives_the_bits_of_the_kernel(name):
-    call, code = code_of(name)
-    assert call.func.file(form_of(call.args)).exists()  # the processor's code is kept when the cards' is made
+def check_bits(call, code):
+    """The code of the threads, compiled for the processor, fills the arrays of the kernel's call with the same bits."""
     call()
     twin = list(call.args)
     for index in PER_CASE[2:]:
@@ -44,6 +48,25 @@ def test_on_the_processor_the_code_gives_the_bits_of_the_kernel(name):
     ProcessorTwin(code).fly_call(twin)
     for index in PER_CASE[2:]:
         assert twin[index].tobytes() == call.args[index].tobytes()
+
+
+@pytest.mark.parametrize("name", CAMPAIGNS)
+def test_on_the_processor_the_code_gives_the_bits_of_the_kernel(name):
+    call, code = code_of(name)
+    assert call.func.file(form_of(call.args)).exists()  # the processor's code is kept when the cards' is made
+    check_bits(call, code)
+
+
+ADAPTIVE = AdaptiveStep(until=86_400.0, rtol=1e-9, method="tp86")
+
+
+@pytest.mark.parametrize("method", ["gj9", *(pytest.param(name, marks=pytest.mark.slow) for name in ("abm12", "tp86"))])
+def test_on_the_processor_methods_of_no_shipped_campaign_give_the_bits_of_the_kernel(method):
+    day = campaign_flight(load_campaign(DAY), CASES)
+    clock = ADAPTIVE if method == "tp86" else replace(day.model.clock, method=method)
+    model, ids = replace(day.model, clock=clock), np.arange(CASES)
+    call = flight.bound_flight(model, day.inputs, ids, day.seed, folder=day.folder, width=1)[0]
+    check_bits(call, thread_code(call.func, call.args))
 
 
 @pytest.mark.parametrize("capability", CAPABILITIES)
