@@ -42,10 +42,12 @@ def percent_digits(share: float) -> str:
     return f"{(Decimal(f'{share:.{MOST_GIVEN}g}') * 100).normalize():f}"
 
 
-def chance_percent(chance: float) -> str:
+def chance_percent(chance: float, decimals: int = 1) -> str:
     """A probability that is neither 0 nor 1, in percent: 31.6, or < 0.1 and > 99.9 where it would round to an end."""
-    percent = f"{100.0 * chance:.1f}"
-    return {"0.0": "< 0.1", "100.0": "> 99.9"}.get(percent, percent)
+    percent, step = f"{100.0 * chance:.{decimals}f}", 0.1**decimals
+    if float(percent) == 0.0:
+        return f"< {step:.{decimals}f}"
+    return f"> {100.0 - step:.{decimals}f}" if float(percent) == 100.0 else percent
 
 
 def outward(value: float, decimals: int, up: bool) -> float:

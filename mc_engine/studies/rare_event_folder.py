@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mc_engine.numbers_in_text import decimals_of, outward, percent_digits
+from mc_engine.numbers_in_text import chance_percent, decimals_of, outward, percent_digits
 from mc_engine.store.result_folder import read_result
 from mc_engine.store.run_files import RARE_EVENT, path_of
 
@@ -106,8 +106,7 @@ def plain_cases(result: dict[str, Any]) -> float:
 def accepted_percent(level: dict[str, Any]) -> str:
     """The accepted fraction of a level in whole percent; only what is exactly 0 or 1 is printed as 0 or 100."""
     accepted = level["accepted"]
-    percent = f"{100.0 * accepted:.0f}"
-    return {"0": "< 1", "100": "> 99"}.get(percent, percent) if 0.0 < accepted < 1.0 else percent
+    return chance_percent(accepted, 0) if 0.0 < accepted < 1.0 else f"{100.0 * accepted:.0f}"
 
 
 def _level_lines(result: dict[str, Any]) -> Iterator[str]:
